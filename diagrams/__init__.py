@@ -1,0 +1,1 @@
+"""What runs: a scenario, its diagram, its replay, plots and figures."""

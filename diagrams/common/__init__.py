@@ -1,0 +1,1 @@
+"""What every study shares: scenario, run, log, replay, plots, CLI."""

@@ -1,0 +1,1 @@
+"""Gauze delivery: the auto-guided movements end to end."""

@@ -1,0 +1,1 @@
+"""A mobile robot among obstacles by switching potentials."""

@@ -1,0 +1,1 @@
+"""The wire-driven snake and the resection of a tumour."""

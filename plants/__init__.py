@@ -1,0 +1,1 @@
+"""What obeys: arm, abdomen, instruments, snake and mobile robot."""

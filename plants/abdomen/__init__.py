@@ -1,0 +1,1 @@
+"""The abdominal wall with its trocar spring."""

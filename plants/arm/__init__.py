@@ -1,0 +1,1 @@
+"""The 7-joint PA-10-7C arm."""

@@ -1,0 +1,1 @@
+"""Laparoscopic instruments, the surgeon's tools and the endoscope."""

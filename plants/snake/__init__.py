@@ -1,0 +1,1 @@
+"""The wire-driven snake of three bending modules on a translation."""

@@ -1,0 +1,1 @@
+"""The mobile robot of the switching potentials."""

@@ -1,0 +1,1 @@
+"""What decides: one Drake LeafSystem a block, grouped by the task it serves."""

@@ -1,0 +1,1 @@
+"""Auto-guided movements (Bauzano et al.): the local planner and its sensors."""

@@ -1,0 +1,1 @@
+"""What every block shares: its base class, geometry, fuzzy inference."""

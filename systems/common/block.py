@@ -1,0 +1,80 @@
+"""The base of all blocks: a digital controller with named, documented ports."""
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, LeafSystem
+
+from systems.common.stopwatch import STOPWATCH
+
+
+class Block(LeafSystem):
+    """A digital controller.
+
+    Physics is continuous and native to Drake; a block has its own period and
+    keeps its state in the context. Each vector input is declared with an
+    *example*: a physically sensible value that documents shape and units, and
+    that the contract test feeds to the block.
+    """
+
+    def vector_in(self, name: str, example: Sequence[float]) -> Any:
+        """Declares a vector input port and returns it.
+
+        Args:
+            name: The port's name.
+            example: A sensible value; its length is the port's size.
+        """
+        return self.DeclareVectorInputPort(
+            name, BasicVector(np.asarray(example, float))
+        )
+
+    def vector_out(
+        self,
+        name: str,
+        size: int,
+        calc: Callable[[Any], Sequence[float]],
+        prerequisites: set[Any],
+    ) -> Any:
+        """Declares a vector output port computed by `calc(context)`.
+
+        Args:
+            name: The port's name.
+            size: Number of elements.
+            calc: Returns the value for a context.
+            prerequisites: Tickets of all that `calc` reads, so that the value
+                is cached and feedthrough is known.
+        """
+
+        def set_output(context: Any, output: Any) -> None:
+            output.SetFromVector(calc(context))
+
+        return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
+
+    def update_every(
+        self, period: float, update: Callable[[Any], Sequence[float]]
+    ) -> None:
+        """Declares `update(context)` as the next value of discrete state 0.
+
+        The update is timed by the stopwatch; it must read nothing but the
+        context.
+
+        Args:
+            period: In seconds, > 0; the first update is at time zero.
+            update: Returns the new state vector.
+
+        Raises:
+            ValueError: If the period is not positive.
+        """
+        if not period > 0.0:
+            raise ValueError(f"{type(self).__name__}: period={period} s must be > 0")
+
+        def timed(context: Any, state: Any) -> None:
+            start = perf_counter()
+            state.set_value(update(context))
+            STOPWATCH.rows.append(
+                (self.get_name(), context.get_time(), perf_counter() - start)
+            )
+
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, timed)

@@ -1,0 +1,1 @@
+"""Passive wrist emulation: the fulcrum found by force."""

@@ -1,0 +1,1 @@
+"""Tumour resection (Martin et al.): procedures, feasibility, planning."""

@@ -1,0 +1,1 @@
+"""Switching potentials (after Fedele et al.): one potential at a time."""
