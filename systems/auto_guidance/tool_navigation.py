@@ -137,7 +137,6 @@ def limit_tip_velocity(
         scale = params.turning_speed * q / turning
     vx, vy, vz, along = vx * scale, vy * scale, vz * scale, along * scale
     # Each border is a half-space: outward normal and the room left before it.
-    # Within one period's reach of it the outward speed is what the room allows.
     borders = [(u, params.max_insertion - q)]
     borders.append(((-u[0], -u[1], -u[2]), q - params.min_insertion))
     tilt = math.acos(min(1.0, max(-1.0, -u[2])))
@@ -167,7 +166,9 @@ def limit_tip_velocity(
     borders.append((normal, range_C * math.sin(half - angle)))
     for n, room in borders:
         outward = vx * n[0] + vy * n[1] + vz * n[2]
-        allowed = max(0.0, room) / params.period
+        room = max(0.0, room)
+        # What can still be braked, and no more than the room itself in a period.
+        allowed = min(math.sqrt(params.acceleration * room), room / params.period)
         if outward > allowed:
             excess = outward - allowed
             vx, vy, vz = vx - excess * n[0], vy - excess * n[1], vz - excess * n[2]
