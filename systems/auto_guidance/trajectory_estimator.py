@@ -137,7 +137,9 @@ class TipFilter:
 
     def initial(self) -> list[float]:
         """The state before the first frame."""
-        return [0.0] * 15 + (self.params.fulcrum or [0.0] * 3) + [0.0] * 6 + [NEVER, 0.0]
+        return (
+            [0.0] * 15 + (self.params.fulcrum or [0.0] * 3) + [0.0] * 6 + [NEVER, 0.0]
+        )
 
     def absorb(self, x: list[float], m: Sequence[float]) -> list[float]:
         """The state after a measurement; the same state if there is nothing new.
