@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from diagrams.common.wiring import connect, export, swap
 from diagrams.gauze.scenario import GauzeScenario
@@ -26,12 +27,13 @@ WIRES = (
     # The surgeon's tools are seen by the tracker; estimators make sense of it.
     ("target_tool.shaft", "optical_tracker.S"),
     ("obstacle_tool.shaft", "optical_tracker.O"),
+    ("tracker_noise.y0", "optical_tracker.noise"),
     ("optical_tracker.S_measured", "target_estimator.measurement"),
     ("optical_tracker.O_measured", "obstacle_estimator.measurement"),
     # The camera follows S and gives the view cone.
     ("target_estimator.estimate", "endoscope.target"),
     # Figure 2's feedback: where the robot's tool is.
-    ("plant.arm_state", "robot_location.arm_state"),
+    ("plant.pa10_state", "robot_location.arm_state"),
     ("fulcrum.y0", "robot_location.fulcrum"),
     # Figure 4, the local planner: three behaviours and the fuzzy decision.
     ("robot_location.robot_tool", "go_to_target.robot_tool"),
@@ -58,7 +60,7 @@ WIRES = (
     ("target_estimator.estimate", "tool_navigation.target"),
     ("endoscope.view_cone", "tool_navigation.view_cone"),
     ("tool_navigation.tool", "joint_commands.tool"),
-    ("joint_commands.set_point", "plant.arm_desired_state"),
+    ("joint_commands.set_point", "plant.pa10_desired_state"),
     # What people hold in their hands moves the bodies of the scene.
     ("target_tool.shaft", "posed_tools.S"),
     ("obstacle_tool.shaft", "posed_tools.O"),
@@ -112,7 +114,10 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
     return {
         "target_tool": SurgeonTool(target),
         "obstacle_tool": SurgeonTool(obstacle),
-        "optical_tracker": OpticalTracker(replace(s.tracker, seed=s.seed)),
+        "optical_tracker": OpticalTracker(s.tracker),
+        "tracker_noise": RandomSource(
+            RandomDistribution.kGaussian, 12, s.tracker.period
+        ),
         "target_estimator": TrajectoryEstimator(estimators[0]),
         "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
