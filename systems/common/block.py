@@ -1,7 +1,6 @@
 """The base of all blocks: a digital controller with named, documented ports."""
 
 from collections.abc import Callable, Sequence
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -48,7 +47,10 @@ class Block(LeafSystem):
         """
 
         def set_output(context: Any, output: Any) -> None:
+            with_time = STOPWATCH.begin()
             output.SetFromVector(calc(context))
+            if with_time:
+                STOPWATCH.end(self.get_name(), context.get_time())
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
 
@@ -71,10 +73,9 @@ class Block(LeafSystem):
             raise ValueError(f"{type(self).__name__}: period={period} s must be > 0")
 
         def timed(context: Any, state: Any) -> None:
-            start = perf_counter()
+            with_time = STOPWATCH.begin()
             state.set_value(update(context))
-            STOPWATCH.rows.append(
-                (self.get_name(), context.get_time(), perf_counter() - start)
-            )
+            if with_time:
+                STOPWATCH.end(self.get_name(), context.get_time(), True)
 
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, timed)
