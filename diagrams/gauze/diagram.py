@@ -27,7 +27,7 @@ WIRES = (
     # The surgeon's tools are seen by the tracker; estimators make sense of it.
     ("target_tool.shaft", "optical_tracker.S"),
     ("obstacle_tool.shaft", "optical_tracker.O"),
-    ("tracker_noise.y0", "optical_tracker.noise"),
+    ("tracker_noise.output", "optical_tracker.noise"),
     ("optical_tracker.S_measured", "target_estimator.measurement"),
     ("optical_tracker.O_measured", "obstacle_estimator.measurement"),
     # The camera follows S and gives the view cone.
