@@ -1,11 +1,11 @@
 """The base of all blocks: a digital controller with named, documented ports."""
 
 from collections.abc import Callable, Sequence
-from time import perf_counter
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, LeafSystem
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
 from systems.common.stopwatch import STOPWATCH
 
@@ -48,9 +48,34 @@ class Block(LeafSystem):
         """
 
         def set_output(context: Any, output: Any) -> None:
+            with_time = STOPWATCH.begin()
             output.SetFromVector(calc(context))
+            if with_time:
+                STOPWATCH.end(self.get_name(), context.get_time())
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
+
+    def cached(
+        self, name: str, calc: Callable[[Any], Any], prerequisites: set[Any]
+    ) -> Any:
+        """Declares a value that several outputs or the update share.
+
+        Args:
+            name: The cache entry's name.
+            calc: Returns the value, any object, for a context. Readers must
+                not change it.
+            prerequisites: Tickets of all that `calc` reads.
+
+        Returns:
+            The cache entry: `Eval(context)` gives the value, `ticket()` makes
+            it a prerequisite.
+        """
+
+        def store(context: Any, value: Any) -> None:
+            value.set_value(calc(context))
+
+        producer = ValueProducer(allocate=lambda: AbstractValue.Make([]), calc=store)
+        return self.DeclareCacheEntry(name, producer, prerequisites)
 
     def update_every(
         self, period: float, update: Callable[[Any], Sequence[float]]
@@ -71,10 +96,9 @@ class Block(LeafSystem):
             raise ValueError(f"{type(self).__name__}: period={period} s must be > 0")
 
         def timed(context: Any, state: Any) -> None:
-            start = perf_counter()
+            with_time = STOPWATCH.begin()
             state.set_value(update(context))
-            STOPWATCH.rows.append(
-                (self.get_name(), context.get_time(), perf_counter() - start)
-            )
+            if with_time:
+                STOPWATCH.end(self.get_name(), context.get_time(), True)
 
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, timed)
