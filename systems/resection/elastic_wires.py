@@ -1,0 +1,129 @@
+"""Elastic wires: springs along the wires that can go slack, and snap."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from plants.snake.actuation import wire_lengths
+from plants.snake.drive import SnakeDriveParams
+from plants.snake.parameters import SnakeParams
+from plants.snake.snake import FAR, NEAR, POSITIONS
+from plants.snake.tension import length_jacobian
+from systems.common.block import Block
+from systems.resection.resection_ik import from_universal
+
+
+@dataclass
+class WireBreak:
+    """A wire that snaps.
+
+    Attributes:
+        wire: 0 to 8.
+        time: In s.
+    """
+
+    wire: int = 0
+    time: float = 0.0
+
+
+@dataclass
+class ElasticWiresParams:
+    """Parameters of `ElasticWires`.
+
+    Attributes:
+        breaks: Wires that snap.
+    """
+
+    breaks: list[WireBreak] = field(default_factory=list)
+
+    def check(self) -> None:
+        """Raises ValueError for a wire that is not there or a time before zero."""
+        for item in self.breaks:
+            if not 0 <= item.wire <= 8:
+                raise ValueError(
+                    f"elastic_wires.breaks: wire={item.wire}, expected 0 to 8; nearest "
+                    f"{min(max(item.wire, 0), 8)}"
+                )
+            if not item.time >= 0.0:
+                raise ValueError(
+                    f"elastic_wires.breaks: time={item.time} s, expected >= 0"
+                )
+
+
+class ElasticWires(Block):
+    """Tensions of elastic wires and the joint torques that they exert.
+
+    With the drums at length L_d and the wire's path L(q), a wire pulls with
+
+        T = max(0, k (L - L_d) + c (dL/dt - dL_d/dt)),   tau = -(dL/dq)^T T,
+
+    and a broken one not at all. It stands beside the drum model as its validation;
+    explicit in the integrator, it needs steps of 0.2 ms.
+
+    Port ``state`` accepts the plant's positions, then velocities, of the snake [m,
+    rad, m/s, rad/s] (26).
+
+    Port ``lengths`` accepts what the drums have wound out, wires 0 to 8, and the
+    translation [m] (10).
+
+    Port ``rates`` accepts their time derivatives [m/s] (10).
+
+    Port ``generalized_force`` emits torques on the snake's velocities; none acts on
+    the translation [N, Nm] (13).
+
+    Port ``tension`` emits the tension of wires 0 to 8 [N] (9).
+    """
+
+    def __init__(
+        self,
+        params: ElasticWiresParams | None = None,
+        snake: SnakeParams | None = None,
+        drive: SnakeDriveParams | None = None,
+    ) -> None:
+        """Makes the block."""
+        super().__init__()
+        self._params = params or ElasticWiresParams()
+        self._params.check()
+        self._snake = (snake or SnakeParams()).check()
+        self._drive = (drive or SnakeDriveParams()).check()
+        straight = wire_lengths(np.zeros(7), self._snake)
+        self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
+        self._lengths = self.vector_in("lengths", [*(straight - 2e-4), 0.0])
+        self._rates = self.vector_in("rates", [0.0] * 10)
+        inputs = {p.ticket() for p in (self._state, self._lengths, self._rates)}
+        if self._params.breaks:
+            inputs.add(self.time_ticket())
+        self.vector_out("generalized_force", POSITIONS, self._calc_force, inputs)
+        self.vector_out("tension", 9, self._calc_tension, inputs)
+
+    def _pull(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Tensions (9) and dL/d(a1, ..., b3), (9, 6)."""
+        state = self._state.Eval(context)
+        x = state[NEAR]
+        x[1:] = (x[1:] + state[FAR]) / 2
+        v = state[POSITIONS:]
+        ab_rate = (v[NEAR[1:]] + v[FAR]) / 2
+        J = length_jacobian(x[1:], self._snake)
+        stretch = wire_lengths(from_universal(x.tolist()), self._snake)
+        stretch -= self._lengths.Eval(context)[:9]
+        rate = J @ ab_rate - self._rates.Eval(context)[:9]
+        drive = self._drive
+        T = drive.wire_stiffness * stretch + drive.wire_damping * rate
+        np.maximum(T, 0.0, out=T)
+        for item in self._params.breaks:
+            if context.get_time() >= item.time:
+                T[item.wire] = 0.0
+        return T, J
+
+    def _calc_force(self, context: Any) -> Sequence[float]:
+        T, J = self._pull(context)
+        tau = -0.5 * (T @ J)  # the wires turn both balls of a module alike
+        force = np.zeros(POSITIONS)
+        force[NEAR[1:]] = tau
+        force[FAR] = tau
+        return force
+
+    def _calc_tension(self, context: Any) -> Sequence[float]:
+        return self._pull(context)[0]

@@ -1,0 +1,138 @@
+"""Resection IK: postures for tool poses, reached at a bounded speed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from plants.snake.inverse_kinematics import REACHED, tool_postures
+from plants.snake.parameters import SnakeParams
+from systems.common.block import Block
+
+HOLD = -1
+"""Status of an input that is no pose at all."""
+
+
+@dataclass
+class ResectionIkParams:
+    """Parameters of `ResectionIk`.
+
+    Attributes:
+        period: In s.
+        bend_rate: Largest rate of a or b of a ball, in rad/s.
+        travel_rate: Largest speed of the translation, in m/s.
+    """
+
+    period: float = 0.01
+    bend_rate: float = 1.0
+    travel_rate: float = 0.03
+
+    def check(self) -> None:
+        """Raises ValueError for a value that makes no sense."""
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(
+                    f"resection_ik.{name}={value}: expected > 0; the default is "
+                    f"{getattr(ResectionIkParams(), name)}"
+                )
+
+
+def universal(posture: Sequence[float]) -> list[float]:
+    """(s, a1, b1, ..., b3) of a posture (s, alpha1, beta1, ..., beta3)."""
+    x = [posture[0]]
+    for alpha, beta in zip(posture[1::2], posture[2::2], strict=True):
+        sb = math.sin(beta)
+        x.append(math.atan2(-sb * math.sin(alpha), math.cos(beta)))
+        x.append(math.asin(sb * math.cos(alpha)))
+    return x
+
+
+def from_universal(x: Sequence[float]) -> list[float]:
+    """The posture of (s, a1, b1, ..., b3)."""
+    q = [x[0]]
+    for a, b in zip(x[1::2], x[2::2], strict=True):
+        along, across = math.sin(b), -math.sin(a) * math.cos(b)
+        q.append(math.atan2(across, along))
+        q.append(
+            math.atan2(math.hypot(along, across), math.cos(a) * math.cos(b)),
+        )
+    return q
+
+
+def step_towards(
+    now: Sequence[float], goal: Sequence[float], params: ResectionIkParams
+) -> list[float]:
+    """One period's step on the straight line from x to x_goal, all joints in time.
+
+    In (s, a, b) coordinates: the line stays within the bend's limit, whose cone is
+    convex in them.
+    """
+    most = max(
+        abs(goal[0] - now[0]) / params.travel_rate,
+        *(
+            abs(g - n) / params.bend_rate
+            for n, g in zip(now[1:], goal[1:], strict=True)
+        ),
+    )
+    share = min(params.period / most, 1.0) if most > 0.0 else 1.0
+    return [n + share * (g - n) for n, g in zip(now, goal, strict=True)]
+
+
+class ResectionIk(Block):
+    """Inverse kinematics of the whole robot, tool pose to posture (paper, V.B).
+
+    The two redundant freedoms are the intermediate axis, which the target brings
+    along. A pose out of reach, or numbers that are not finite, leave the posture
+    where it is. A target that jumps is approached on a straight line in the
+    modules' angles; one that moves slower than the rates allow is met exactly.
+
+    Port ``target`` accepts p_WT [m], tool axis n_WT and intermediate axis n_WI,
+    channel frame W (9). The axes need not be unit vectors.
+
+    Port ``posture`` emits s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7), to be
+    reached at the period's end.
+
+    Port ``status`` emits 0 if the target is reached or approached, else the limit
+    that stops it (`plants.snake.inverse_kinematics`), or -1 for no pose at all (1).
+    """
+
+    def __init__(
+        self,
+        params: ResectionIkParams | None = None,
+        snake: SnakeParams | None = None,
+        posture: Sequence[float] = (0.0,) * 7,
+    ) -> None:
+        """Makes the block, starting at a posture (7)."""
+        super().__init__()
+        self._params = params or ResectionIkParams()
+        self._params.check()
+        self._snake = (snake or SnakeParams()).check()
+        straight = 3 * self._snake.straight_module + self._snake.tool_offset
+        self._target = self.vector_in(
+            "target", [0.0, 0.0, straight, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]
+        )
+        self.DeclareDiscreteState([*universal(posture), 0.0])
+        both = {self.xd_ticket(), self._target.ticket()}
+        self.vector_out("posture", 7, self._calc_posture, both)
+        self.vector_out("status", 1, self._calc_status, both)
+        self.update_every(self._params.period, self._next)
+
+    def _next(self, context: Any) -> Sequence[float]:
+        """Where the posture is to be one period later, and the status."""
+        state = context.get_discrete_state(0).value().tolist()
+        target = self._target.Eval(context)
+        try:
+            answer = tool_postures(target[:3], target[3:6], target[6:], self._snake)
+        except ValueError:
+            return [*state[:7], HOLD]
+        status = int(answer.status)
+        if status != REACHED:
+            return [*state[:7], status]
+        goal = universal(answer.q.tolist())
+        return [*step_towards(state[:7], goal, self._params), REACHED]
+
+    def _calc_posture(self, context: Any) -> Sequence[float]:
+        return from_universal(self._next(context)[:7])
+
+    def _calc_status(self, context: Any) -> Sequence[float]:
+        return self._next(context)[7:]

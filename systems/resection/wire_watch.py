@@ -1,0 +1,72 @@
+"""Wire watch: notices a slack or broken wire and stops the drums."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from systems.common.block import Block
+
+
+@dataclass
+class WireWatchParams:
+    """Parameters of `WireWatch`.
+
+    Attributes:
+        period: At which tensions are sampled, in s.
+        least: Tension below which a wire counts as slack, in N.
+        samples: Slack samples in a row that raise the alarm.
+    """
+
+    period: float = 0.01
+    least: float = 0.5
+    samples: int = 2
+
+    def check(self) -> None:
+        """Raises ValueError for a value that makes no sense."""
+        if not self.period > 0.0:
+            raise ValueError(f"wire_watch.period={self.period} s: expected > 0")
+        if not self.least >= 0.0:
+            raise ValueError(f"wire_watch.least={self.least} N: expected >= 0")
+        if self.samples < 1:
+            raise ValueError(f"wire_watch.samples={self.samples}: expected >= 1")
+
+
+class WireWatch(Block):
+    """Raises an alarm, and keeps it, once a wire has been slack for some samples.
+
+    Port ``tension`` accepts the tension of wires 0 to 8, as load cells at the drums
+    measure them [N] (9).
+
+    Port ``stop`` emits 0, and 1 from the alarm on (1).
+
+    Port ``alarm`` emits the alarm's time [s] and the wire, or -1 and -1 (2).
+    """
+
+    def __init__(self, params: WireWatchParams | None = None) -> None:
+        """Makes the block."""
+        super().__init__()
+        self._params = params or WireWatchParams()
+        self._params.check()
+        self._tension = self.vector_in("tension", [4.0] * 9)
+        # Slack samples in a row by wire, then the alarm's time and wire.
+        self.DeclareDiscreteState([0.0] * 9 + [-1.0, -1.0])
+        self.vector_out("stop", 1, self._calc_stop, {self.xd_ticket()})
+        self.vector_out("alarm", 2, self._calc_alarm, {self.xd_ticket()})
+        self.update_every(self._params.period, self._update)
+
+    def _calc_stop(self, context: Any) -> Sequence[float]:
+        return [float(context.get_discrete_state(0).value()[9] >= 0.0)]
+
+    def _calc_alarm(self, context: Any) -> Sequence[float]:
+        return context.get_discrete_state(0).value()[9:]
+
+    def _update(self, context: Any) -> Sequence[float]:
+        state = context.get_discrete_state(0).value()
+        slack = self._tension.Eval(context) < self._params.least
+        count = np.where(slack, state[:9] + 1.0, 0.0)
+        alarm = state[9:].tolist()
+        if alarm[0] < 0.0 and count.max() >= self._params.samples:
+            alarm = [context.get_time(), float(count.argmax())]
+        return [*count, *alarm]
