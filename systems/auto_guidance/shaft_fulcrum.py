@@ -180,12 +180,12 @@ class ShaftFulcrum:
         g: Point = (x[0], x[1], x[2])
         P: PointCovariance = (x[3], x[4], x[5], x[6], x[7], x[8])
         r: Point = (x[9], x[10], x[11])
-        if self._given is None:
-            if dt is None:
-                (g, P), r = self._beforehand(c, u), u
-            else:
-                q = self._drift2 * dt
-                P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
+        first = self._given is None and dt is None
+        if first:
+            (g, P), r = self._beforehand(c, u), u
+        elif self._given is None and dt is not None:
+            q = self._drift2 * dt
+            P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
         dx, dy, dz = g[0] - cx, g[1] - cy, g[2] - cz
         d2 = dx * dx + dy * dy + dz * dz
         along = dx * ux + dy * uy + dz * uz
@@ -196,7 +196,7 @@ class ShaftFulcrum:
         if d2 - along * along > self._gate2 * (var_line + var_g):
             if self._given is None:  # another fulcrum: begin again
                 (g, P), r = self._beforehand(c, u), u
-        elif along > _NEAREST:
+        elif along > _NEAREST and not first:
             distance = math.sqrt(d2)
             dx, dy, dz = dx / distance, dy / distance, dz / distance
             weight = d2 * self.var_u / (var_line + var_g)
