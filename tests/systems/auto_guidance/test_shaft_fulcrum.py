@@ -8,7 +8,6 @@ import pytest
 from systems.auto_guidance.optical_tracker import MarkerBody, disturb
 from systems.auto_guidance.shaft_fulcrum import (
     ShaftFulcrum,
-    across,
     lateral_variance,
     measure,
 )
@@ -51,14 +50,6 @@ def track(fulcrum, tips, seed, true=G, state=None):
         errors.append(np.array(fused) - tip)
         spreads.append(variance + shared)
     return state, np.array(errors), np.array(spreads)
-
-
-def test_across_is_orthonormal():
-    rng = np.random.default_rng(1)
-    for u in [*rng.normal(size=(50, 3)), [1.0, 0, 0], [0, 1.0, 0], [0, 0, -1.0]]:
-        u = np.array(u) / np.linalg.norm(u)
-        frame = np.array([u, *across(tuple(u.tolist()))])
-        np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
 
 
 def test_measure_is_the_matrix_form():

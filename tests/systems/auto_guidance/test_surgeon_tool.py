@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from pydrake.common.yaml import yaml_load_typed
 import pytest
 
 from systems.auto_guidance.recording import save_recording
@@ -136,6 +137,20 @@ def test_shaft_passes_the_fulcrum():
 def test_bad_parameters_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         SurgeonTool(SurgeonToolParams(**changes))
+
+
+def test_parameters_come_from_yaml():
+    text = """
+    p_WG: [0.02, 0.11, 0]
+    times: [0, 2]
+    points: [[0, 0.02, -0.11], [0.02, 0, -0.1]]
+    recording: null
+    pushes:
+    - {start: 3, direction: [0, -1, 0], distance: 0.03}
+    """
+    params = yaml_load_typed(schema=SurgeonToolParams, data=text)
+    assert params.pushes[0].distance == 0.03
+    assert tip_motion(params)(2.5)[:3] == (0.02, 0.0, -0.1)
 
 
 def test_recording_above_the_fulcrum_is_refused(tmp_path):
