@@ -6,7 +6,6 @@ The joint servos are Drake's PD actuators, so that they are part of the continuo
 dynamics.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 from pathlib import Path
@@ -16,17 +15,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
 
+from plants.arm.parameters import BASE_POSITION, FRICTION, JOINTS
 from plants.common.models import add_model
-
-JOINTS = 7
-POSITION_LIMIT = np.radians([177.0, 91.0, 174.0, 137.0, 255.0, 165.0, 255.0])
-"""Joint limits in rad, the same on both sides (7)."""
-SPEED_LIMIT = np.radians([57.0, 57.0, 114.0, 114.0, 360.0, 360.0, 360.0])
-"""Joint speed limits in rad/s (7). Drake does not enforce them: planners must."""
-TORQUE_LIMIT = np.array([158.0, 158.0, 68.0, 68.0, 17.0, 17.0, 17.0])
-"""Joint torque limits in Nm (7). The PD actuators keep them."""
-FRICTION = np.array([10.0, 10.0, 5.0, 5.0, 2.0, 2.0, 2.0])
-"""Viscous joint friction in Nm s/rad (7)."""
 
 
 @dataclass
@@ -73,7 +63,8 @@ def add_arm(
 
     Args:
         plant: A MultibodyPlant that is not yet finalized.
-        X_PB: Pose of the base B (z up its first axis) in the parent frame P.
+        X_PB: Pose of the base B (z up its first axis) in the parent frame P; the
+            default stands at `BASE_POSITION`.
         parent: A frame of the plant; the world if None.
         params: Servo gains.
 
@@ -89,7 +80,7 @@ def add_arm(
     plant.WeldFrames(
         parent or plant.world_frame(),
         plant.GetFrameByName("base", instance),
-        X_PB or RigidTransform(),
+        X_PB or RigidTransform(BASE_POSITION),
     )
     plant.set_gravity_enabled(instance, False)
     for i, (kp, kd) in enumerate(zip(params.kp, params.kd, strict=True), start=1):
@@ -150,15 +141,3 @@ class SetPoint:
         if tau is not None:
             sent[:JOINTS] += self._compliance * tau
         return sent
-
-
-def check_joints(q: Sequence[float]) -> None:
-    """Raises ValueError if a joint vector has a bad size or leaves the limits."""
-    if len(q) != JOINTS:
-        raise ValueError(f"q has {len(q)} joints, expected {JOINTS}")
-    for i, (qi, limit) in enumerate(zip(q, POSITION_LIMIT, strict=True)):
-        if not abs(qi) <= limit:
-            raise ValueError(
-                f"q[{i}]={qi} rad is outside +-{limit:.3f} rad; "
-                f"nearest {math.copysign(limit, qi):.3f}"
-            )

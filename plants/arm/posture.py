@@ -1,32 +1,18 @@
-"""Where the arm stands, and the posture that reaches a point through the trocar.
+"""The posture that reaches a point through the trocar, to start from.
 
-The base stands upright beside the patient, at the height of the wall, its x axis
-towards the fulcrum. From there the elbow is up, the wrist hangs above the trocar
-and every tip within 35 deg of the vertical and 60 to 180 mm inside is reached far
-from the joints' limits (measured by the tests).
+From its place beside the patient the arm keeps its elbow up and its wrist above the
+trocar, and reaches every tip within 35 deg of the vertical and 60 to 180 mm inside,
+far from the joints' limits (sampled by the tests).
 """
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.solvers import Solve
 
-from plants.arm.arm import JOINTS, POSITION_LIMIT
-
-BASE_DISTANCE = 0.66
-"""From the base's first axis to the fulcrum, horizontally, in m."""
-BASE_HEIGHT = 0.0
-"""Height of the base above the fulcrum, in m."""
-NOMINAL_POSTURE = [0.0, 0.6, 0.0, 1.6, 0.0, 0.94, 0.0]
-"""Elbow up, wrist down, in rad."""
-
-
-def base_pose(p_WG: Sequence[float]) -> RigidTransform:
-    """X_WB for a trocar at p_WG (3, in m): the arm stands at its -x side."""
-    return RigidTransform([p_WG[0] - BASE_DISTANCE, p_WG[1], p_WG[2] + BASE_HEIGHT])
+from plants.arm.parameters import JOINTS, POSITION_LIMIT, READY_POSTURE
 
 
 def home_posture(
@@ -45,7 +31,7 @@ def home_posture(
         tip: The instrument's tip frame, z along the shaft.
         p_WG: Fulcrum in m (3).
         p_WP: Tip in m (3).
-        seed: Posture to stay near to, in rad (7); the nominal one if None.
+        seed: Posture to stay near to, in rad (7); the ready one if None.
 
     Returns:
         q (7) in rad, within the limits.
@@ -64,7 +50,7 @@ def home_posture(
     ik.AddAngleBetweenVectorsConstraint(tip, [0.0, 0.0, 1.0], world, u, 0.0, 1e-6)
     start = plant.GetJointByName("joint1", arm).position_start()
     q = ik.q()[start : start + JOINTS]
-    near = np.asarray(NOMINAL_POSTURE if seed is None else seed, float)
+    near = np.asarray(READY_POSTURE if seed is None else seed, float)
     # The roll about the shaft is free: a light weight keeps it near zero.
     weight = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.3])
     ik.prog().AddQuadraticErrorCost(weight, near, q)
