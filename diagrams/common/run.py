@@ -27,7 +27,6 @@ INTEGRATOR = SimulatorConfig(
     integration_scheme="cenic",
     accuracy=1e-3,
     max_step_size=0.01,
-    publish_every_time_step=False,
 )
 """All plants are continuous and stepped by CENIC."""
 

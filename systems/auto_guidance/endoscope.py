@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+import numpy as np
+
 from systems.common.block import Block
 
 
@@ -164,7 +166,8 @@ class Endoscope(Block):
             "target",
             [0.0, 0.0, -0.13, *[0.0] * 6, 0.05, 0.0, 0.0, 1e-3, 1e-2, 0.1, 1.0, 0.02],
         )
-        self.DeclareDiscreteState([*wanted_tip(params, *params.p_WS), 0.0, 0.0, 0.0])
+        start = [*wanted_tip(params, *params.p_WS), 0.0, 0.0, 0.0]
+        self.DeclareDiscreteState(np.array(start))
         state = {self.xd_ticket()}
         self.vector_out("view_cone", 7, self._calc_cone, state)
         self.vector_out("shaft", 6, self._calc_shaft, state)

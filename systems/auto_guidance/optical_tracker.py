@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import BasicVector
 
@@ -197,12 +198,12 @@ class OpticalTracker(Block):
         example = [0.05, 0.0, -0.12, 0.0, 0.0, -1.0]
         self._shafts = [self.vector_in(tool, example) for tool in TOOLS]
         self._noise = self.DeclareVectorInputPort(
-            "noise", BasicVector([0.0] * 12), RandomDistribution.kGaussian
+            "noise", BasicVector(np.zeros(12)), RandomDistribution.kGaussian
         )
         # The delay line, oldest frame first: S (8) and O (8) of each frame.
         frames = max(1, math.ceil(params.latency / params.period - 1e-9))
         unseen = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, NEVER, 0.0]
-        self.DeclareDiscreteState(2 * unseen * frames)
+        self.DeclareDiscreteState(np.array(2 * unseen * frames))
         state = {self.xd_ticket()}
         self.vector_out("S_measured", 8, lambda c: self._delivered(c)[:8], state)
         self.vector_out("O_measured", 8, lambda c: self._delivered(c)[8:16], state)
@@ -214,7 +215,8 @@ class OpticalTracker(Block):
     def _expose(self, context: Any) -> Sequence[float]:
         time = context.get_time()
         line = context.get_discrete_state(0).value().tolist()
-        noise = self._noise.Eval(context).tolist()
+        normal: Any = self._noise.Eval(context)
+        noise = normal.tolist()
         frame = line[-16:]
         for tool in (0, 1):
             shaft = self._shafts[tool].Eval(context).tolist()

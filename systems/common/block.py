@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, LeafSystem
+from pydrake.common.value import AbstractValue
+from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
 from systems.common.stopwatch import STOPWATCH
 
@@ -53,6 +54,28 @@ class Block(LeafSystem):
                 STOPWATCH.end(self.get_name(), context.get_time())
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
+
+    def cached(
+        self, name: str, calc: Callable[[Any], Any], prerequisites: set[Any]
+    ) -> Any:
+        """Declares a value that several outputs or the update share.
+
+        Args:
+            name: The cache entry's name.
+            calc: Returns the value, any object, for a context. Readers must
+                not change it.
+            prerequisites: Tickets of all that `calc` reads.
+
+        Returns:
+            The cache entry: `Eval(context)` gives the value, `ticket()` makes
+            it a prerequisite.
+        """
+
+        def store(context: Any, value: Any) -> None:
+            value.set_value(calc(context))
+
+        producer = ValueProducer(allocate=lambda: AbstractValue.Make([]), calc=store)
+        return self.DeclareCacheEntry(name, producer, prerequisites)
 
     def update_every(
         self, period: float, update: Callable[[Any], Sequence[float]]

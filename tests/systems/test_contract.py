@@ -81,7 +81,7 @@ def test_ports_are_named_and_documented(kind):
     ports += [dut.get_output_port(i) for i in range(dut.num_output_ports())]
     assert ports
     for port in ports:
-        assert f"Port ``{port.get_name()}``" in text
+        assert f"``{port.get_name()}``" in text
 
 
 @pytest.mark.parametrize("kind", ALONE, ids=lambda kind: kind.__name__)
