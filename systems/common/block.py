@@ -1,7 +1,6 @@
 """The base of all blocks: a digital controller with named, documented ports."""
 
 from collections.abc import Callable, Sequence
-from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -49,8 +48,11 @@ class Block(LeafSystem):
         """
 
         def set_output(context: Any, output: Any) -> None:
+            with_time = STOPWATCH.begin()
             # Drake takes an array several times faster than a list.
             output.SetFromVector(np.asarray(calc(context)))
+            if with_time:
+                STOPWATCH.end(self.get_name(), context.get_time())
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
 
@@ -95,10 +97,9 @@ class Block(LeafSystem):
             raise ValueError(f"{type(self).__name__}: period={period} s must be > 0")
 
         def timed(context: Any, state: Any) -> None:
-            start = perf_counter()
+            with_time = STOPWATCH.begin()
             state.set_value(np.asarray(update(context)))
-            STOPWATCH.rows.append(
-                (self.get_name(), context.get_time(), perf_counter() - start)
-            )
+            if with_time:
+                STOPWATCH.end(self.get_name(), context.get_time(), True)
 
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, timed)
