@@ -41,7 +41,6 @@ WIRES = (
     ("target_estimator.estimate", "go_to_target.target"),
     ("go_to_target.v1", "velocity_corrections.v1"),
     ("go_to_target.guide", "velocity_corrections.guide"),
-    ("robot_location.robot_tool", "velocity_corrections.robot_tool"),
     ("obstacle_estimator.estimate", "velocity_corrections.obstacle"),
     ("go_to_target.guide", "backward_movement.guide"),
     ("obstacle_estimator.estimate", "backward_movement.obstacle"),

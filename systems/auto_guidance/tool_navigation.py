@@ -16,6 +16,7 @@ import math
 from typing import Any
 
 from systems.common.block import Block
+from systems.common.geometry import Vector
 
 MOVING = 0
 REASONS = {
@@ -27,8 +28,6 @@ REASONS = {
     6: "arm does not follow",
 }
 """Why the robot stands: the code on port ``stop`` and its text."""
-
-Vector = tuple[float, float, float]
 
 
 @dataclass
@@ -88,7 +87,9 @@ def unit(x: float, y: float, z: float) -> tuple[Vector, float]:
     return (x / length, y / length, z / length), length
 
 
-def reachable(params: ToolNavigationParams, p_WG: Vector, p_WP: Vector) -> bool:
+def reachable(
+    params: ToolNavigationParams, p_WG: Sequence[float], p_WP: Sequence[float]
+) -> bool:
     """Whether the tool through fulcrum p_WG can have its tip at p_WP (both in W)."""
     u, length = unit(p_WP[0] - p_WG[0], p_WP[1] - p_WG[1], p_WP[2] - p_WG[2])
     return params.min_insertion <= length <= params.max_insertion and -u[2] >= math.cos(
@@ -96,7 +97,7 @@ def reachable(params: ToolNavigationParams, p_WG: Vector, p_WP: Vector) -> bool:
     )
 
 
-def cone_angle(view_cone: Sequence[float], p_WP: Vector) -> float:
+def cone_angle(view_cone: Sequence[float], p_WP: Sequence[float]) -> float:
     """Angle [rad] of a point to the axis of a view cone (apex, axis, half angle)."""
     a, _ = unit(p_WP[0] - view_cone[0], p_WP[1] - view_cone[1], p_WP[2] - view_cone[2])
     cosine = a[0] * view_cone[3] + a[1] * view_cone[4] + a[2] * view_cone[5]

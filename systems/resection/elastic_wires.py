@@ -95,10 +95,12 @@ class ElasticWires(Block):
         inputs = {p.ticket() for p in (self._state, self._lengths, self._rates)}
         if self._params.breaks:
             inputs.add(self.time_ticket())
-        self.vector_out("generalized_force", POSITIONS, self._calc_force, inputs)
-        self.vector_out("tension", 9, self._calc_tension, inputs)
+        self._pull = self.cached("pull", self._calc_pull, inputs)
+        ticket = {self._pull.ticket()}
+        self.vector_out("generalized_force", POSITIONS, self._calc_force, ticket)
+        self.vector_out("tension", 9, self._calc_tension, ticket)
 
-    def _pull(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _calc_pull(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
         """Tensions (9) and dL/d(a1, ..., b3), (9, 6)."""
         state = self._state.Eval(context)
         x = state[NEAR]
@@ -118,12 +120,12 @@ class ElasticWires(Block):
         return T, J
 
     def _calc_force(self, context: Any) -> Sequence[float]:
-        T, J = self._pull(context)
+        T, J = self._pull.Eval(context)
         tau = -0.5 * (T @ J)  # the wires turn both balls of a module alike
         force = np.zeros(POSITIONS)
         force[NEAR[1:]] = tau
         force[FAR] = tau
-        return force
+        return force.tolist()
 
     def _calc_tension(self, context: Any) -> Sequence[float]:
-        return self._pull(context)[0]
+        return self._pull.Eval(context)[0].tolist()

@@ -112,12 +112,15 @@ class ResectionIk(Block):
             "target", [0.0, 0.0, straight, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]
         )
         self.DeclareDiscreteState([*universal(posture), 0.0])
-        both = {self.xd_ticket(), self._target.ticket()}
-        self.vector_out("posture", 7, self._calc_posture, both)
-        self.vector_out("status", 1, self._calc_status, both)
-        self.update_every(self._params.period, self._next)
+        self._next = self.cached(
+            "next", self._calc_next, {self.xd_ticket(), self._target.ticket()}
+        )
+        ticket = {self._next.ticket()}
+        self.vector_out("posture", 7, self._calc_posture, ticket)
+        self.vector_out("status", 1, self._calc_status, ticket)
+        self.update_every(self._params.period, self._next.Eval)
 
-    def _next(self, context: Any) -> Sequence[float]:
+    def _calc_next(self, context: Any) -> Sequence[float]:
         """Where the posture is to be one period later, and the status."""
         state = context.get_discrete_state(0).value().tolist()
         target = self._target.Eval(context)
@@ -132,7 +135,7 @@ class ResectionIk(Block):
         return [*step_towards(state[:7], goal, self._params), REACHED]
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
-        return from_universal(self._next(context)[:7])
+        return from_universal(self._next.Eval(context)[:7])
 
     def _calc_status(self, context: Any) -> Sequence[float]:
-        return self._next(context)[7:]
+        return self._next.Eval(context)[7:]

@@ -84,35 +84,30 @@ class WireDrums(Block):
         start = straight if lengths is None else [*lengths]
         self._command = self.vector_in("command", straight)
         self._stop = self.vector_in("stop", [0.0])
-        # Lengths, rates, the instant they hold at, and what limits them.
-        self.DeclareDiscreteState([*start, *[0.0] * AXES, 0.0, 0.0])
+        # The lengths at the last update, and its instant.
+        self._start = self.DeclareDiscreteState([*start, 0.0])
+        self._rates = self.state_out("rates", [0.0] * AXES)
+        self.state_out("limited", [0.0])
         self.vector_out(
             "lengths", AXES, self._calc_lengths, {self.xd_ticket(), self.time_ticket()}
         )
-        self.vector_out("rates", AXES, self._calc_rates, {self.xd_ticket()})
-        self.vector_out("limited", 1, self._calc_limited, {self.xd_ticket()})
         self.update_every(self._params.period, self._update)
 
     def _calc_lengths(self, context: Any) -> Sequence[float]:
-        state = context.get_discrete_state(0).value()
-        elapsed = min(context.get_time() - float(state[20]), self._params.period)
-        return state[:10] + elapsed * state[10:20]
+        start = context.get_discrete_state(self._start).value()
+        rates = context.get_discrete_state(self._rates).value()
+        elapsed = min(context.get_time() - float(start[AXES]), self._params.period)
+        return (start[:AXES] + elapsed * rates).tolist()
 
-    def _calc_rates(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(0).value()[10:20]
-
-    def _calc_limited(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(0).value()[21:]
-
-    def _update(self, context: Any) -> Sequence[float]:
+    def _update(self, context: Any) -> Sequence[Sequence[float]]:
         now = np.array(self._calc_lengths(context))
         time, period = context.get_time(), self._params.period
         command = self._command.Eval(context)
         if self._stop.Eval(context)[0] != 0.0 or not np.isfinite(command).all():
-            return [*now, *[0.0] * AXES, time, 0.0]
+            return [*now, time], [0.0] * AXES, [0.0]
         goal = np.minimum(np.maximum(command, self._low), self._high)
         step = goal - now
         slow = float((np.abs(step) / self._most).max())
         limited = 2.0 if (goal != command).any() else 1.0 if slow > 1.0 + 1e-9 else 0.0
         rates = step / (period * max(slow, 1.0))
-        return [*now, *rates, time, limited]
+        return [*now, time], rates.tolist(), [limited]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.actuation import bends_of_lengths, wire_lengths
+from plants.snake.actuation import Bends, bends_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
@@ -41,19 +41,22 @@ class WireForwardActuation(Block):
         straight = [*wire_lengths(np.zeros(7), self._snake).tolist(), 0.0]
         self._lengths = self.vector_in("lengths", straight)
         self._rates = self.vector_in("rates", [0.0] * 10)
-        now = {self._lengths.ticket()}
+        self._bends = self.cached("bends", self._calc_bends, {self._lengths.ticket()})
+        now = {self._lengths.ticket(), self._bends.ticket()}
         both = {self._lengths.ticket(), self._rates.ticket()}
         self.vector_out("posture", 7, self._calc_posture, now)
         self.vector_out("residual", 3, self._calc_residual, now)
         self.vector_out("desired_state", 14, self._calc_desired_state, both)
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
-        lengths = self._lengths.Eval(context)
-        bends = bends_of_lengths(lengths[:9], self._snake)
-        return [float(lengths[9]), *bends.q.tolist()]
+        s = float(self._lengths.Eval(context)[9])
+        return [s, *self._bends.Eval(context).q.tolist()]
+
+    def _calc_bends(self, context: Any) -> Bends:
+        return bends_of_lengths(self._lengths.Eval(context)[:9], self._snake)
 
     def _calc_residual(self, context: Any) -> Sequence[float]:
-        return bends_of_lengths(self._lengths.Eval(context)[:9], self._snake).residual
+        return self._bends.Eval(context).residual.tolist()
 
     def _calc_desired_state(self, context: Any) -> Sequence[float]:
         lengths, rates = self._lengths.Eval(context), self._rates.Eval(context)

@@ -62,4 +62,4 @@ class WireTension(Block):
     def _calc_tension(self, context: Any) -> Sequence[float]:
         ab = self._state.Eval(context)[NEAR[1:]]
         tau = self._actuation.Eval(context)[1:]
-        return tensions(ab, tau, self._snake, self._params.least)
+        return tensions(ab, tau, self._snake, self._params.least).tolist()

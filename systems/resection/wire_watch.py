@@ -50,23 +50,16 @@ class WireWatch(Block):
         self._params = params or WireWatchParams()
         self._params.check()
         self._tension = self.vector_in("tension", [4.0] * 9)
-        # Slack samples in a row by wire, then the alarm's time and wire.
-        self.DeclareDiscreteState([0.0] * 9 + [-1.0, -1.0])
-        self.vector_out("stop", 1, self._calc_stop, {self.xd_ticket()})
-        self.vector_out("alarm", 2, self._calc_alarm, {self.xd_ticket()})
+        self._count = self.DeclareDiscreteState([0.0] * 9)  # slack samples in a row
+        self._alarm = self.state_out("alarm", [-1.0, -1.0])
+        self.state_out("stop", [0.0])
         self.update_every(self._params.period, self._update)
 
-    def _calc_stop(self, context: Any) -> Sequence[float]:
-        return [float(context.get_discrete_state(0).value()[9] >= 0.0)]
-
-    def _calc_alarm(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(0).value()[9:]
-
-    def _update(self, context: Any) -> Sequence[float]:
-        state = context.get_discrete_state(0).value()
+    def _update(self, context: Any) -> Sequence[Sequence[float]]:
         slack = self._tension.Eval(context) < self._params.least
-        count = np.where(slack, state[:9] + 1.0, 0.0)
-        alarm = state[9:].tolist()
+        before = context.get_discrete_state(self._count).value()
+        count = np.where(slack, before + 1.0, 0.0)
+        alarm = context.get_discrete_state(self._alarm).value().tolist()
         if alarm[0] < 0.0 and count.max() >= self._params.samples:
             alarm = [context.get_time(), float(count.argmax())]
-        return [*count, *alarm]
+        return count.tolist(), alarm, [float(alarm[0] >= 0.0)]
