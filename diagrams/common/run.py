@@ -102,7 +102,7 @@ def simulate(
     recorder = replay.add_recorder(builder, station, meshcat, study)
     diagram = builder.Build()
     simulator = Simulator(diagram)
-    ApplySimulatorConfig(INTEGRATOR, simulator)
+    ApplySimulatorConfig(study.integrator(scenario) or INTEGRATOR, simulator)
     context = simulator.get_mutable_context()
     diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
     run = Run(scenario, study, diagram)

@@ -58,7 +58,7 @@ def _lengths(q: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
         L[i] = 0.0
         for m in range(MODULES):
             _half_turn(q[i, 1 + 2 * m], q[i, 2 + 2 * m], x)
-            _add_module(x, rows, m, R, e, h, 1.0, L[i])
+            add_module(x, rows, m, R, e, h, 1.0, L[i])
 
 
 @njit(cache=True)
@@ -68,10 +68,10 @@ def _half_turn(alpha: float, beta: float, x: Any) -> None:
 
 
 @njit(cache=True)
-def _add_module(
+def add_module(
     x: Any, rows: Any, m: int, R: float, e: float, h: float, sign: float, L: Any
 ) -> None:
-    """Adds a module's share to all wires that run through it."""
+    """Adds a module's share, times sign, to all wires through it (compiled)."""
     for w in range(WIRES * m, WIRES * MODULES):
         p = rows[w, 0] * x[0] + rows[w, 1] * x[1] + rows[w, 2] * x[2]
         L[w] += sign * length_of_norm(p, R, e, h)
@@ -99,7 +99,7 @@ def _bends(
                 size = math.sqrt(square)
                 for r in range(3):
                     x[r] /= size
-                _add_module(x, rows, m, R, e, h, -1.0, left)
+                add_module(x, rows, m, R, e, h, -1.0, left)
 
 
 @lru_cache(maxsize=16)

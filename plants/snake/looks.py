@@ -16,7 +16,7 @@ SWEPT = [0.95, 0.55, 0.15, 0.28]
 CHANNEL = [0.55, 0.70, 0.85, 0.18]
 
 SHANK_RADIUS = 0.8e-3
-CHANNEL_LENGTH = 0.05
+CHANNEL_LENGTH = 0.03
 
 
 def _along(z: float) -> RigidTransform:
@@ -38,7 +38,7 @@ def draw_carriage(plant: Any, body: Any, params: SnakeParams) -> None:
     """The base plate before O0, and the tube that carries it."""
     h, e, r = params.half_pitch, params.plate_thickness, params.body_radius
     draw(plant, body, Cylinder(r, e), _along(-h), "base_plate", PLATE)
-    tube = 0.12
+    tube = 0.06
     draw(plant, body, Cylinder(r, tube), _along(-h - 0.5 * (e + tube)), "tube", STEEL)
     foot = -h - e - tube
     draw(plant, body, Cylinder(2.2 * r, 0.02), _along(foot), "motor", DARK)

@@ -177,3 +177,28 @@ def refusal(p_WI: ArrayLike, n_WI: ArrayLike, params: SnakeParams) -> Refusal | 
     limits += ["s_min"] if missing < -1e-12 else []
     limits += ["s_max"] if missing > 1e-12 else []
     return Refusal(limits, gap, tilt_gap, p_best, n, positioning(p_best, n, params).q)
+
+
+def why_not(
+    p_WT: ArrayLike, n_WT: ArrayLike, n_WI: ArrayLike, params: SnakeParams
+) -> str:
+    """Why a tool pose cannot be reached with an intermediate axis; "" if it can.
+
+    Args:
+        p_WT: Position of the tool in m, (3,).
+        n_WT: Its axis, (3,).
+        n_WI: Axis of the intermediate frame, (3,).
+        params: The snake.
+    """
+    p = vectors("p_WT", p_WT)
+    n, m = vectors("n_WT", n_WT, unit=True), vectors("n_WI", n_WI, unit=True)
+    bend = math.atan2(float(np.linalg.norm(np.cross(m, n))), float(m @ n)) / 2
+    if bend > params.max_bend + 1e-9:
+        return (
+            f"stopped by beta3: tool and intermediate axis ask for {bend:.4f} rad, "
+            f"at most {params.max_bend:.4f} rad can be had"
+        )
+    mid = (m + n) / np.linalg.norm(m + n)
+    p_WI = p - params.tool_offset * n - 2 * params.half_pitch * (mid + n)
+    answer = refusal(p_WI, m, params)
+    return f"intermediate pose {answer}" if answer else ""

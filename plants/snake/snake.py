@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
@@ -34,10 +35,13 @@ from plants.snake.parameters import MODULES, SnakeParams
 POSITIONS = 1 + 4 * MODULES
 """Generalised positions, and velocities: s, then a, b, b_far, a_far a module."""
 
-NEAR = [0, *(i for k in range(MODULES) for i in (1 + 4 * k, 2 + 4 * k))]
-"""Where s, a1, b1, a2, ... stand among them."""
+NEAR_ANGLES = np.array([i for k in range(MODULES) for i in (1 + 4 * k, 2 + 4 * k)])
+"""Where a1, b1, a2, ... stand among them."""
 
-FAR = [i for k in range(MODULES) for i in (4 + 4 * k, 3 + 4 * k)]
+NEAR = np.array([0, *NEAR_ANGLES])
+"""Where s, a1, b1, a2, ... stand."""
+
+FAR = np.array([i for k in range(MODULES) for i in (4 + 4 * k, 3 + 4 * k)])
 """Where the coupled angles a1_far, b1_far, ... stand."""
 
 STOP = math.radians(4.0)

@@ -8,11 +8,11 @@ import numpy as np
 
 from plants.snake.actuation import wire_lengths
 from plants.snake.drive import SnakeDriveParams
+from plants.snake.elastic import elastic_pull
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake import FAR, NEAR, POSITIONS
-from plants.snake.tension import length_jacobian
+from plants.snake.snake import FAR, NEAR_ANGLES, POSITIONS
 from systems.common.block import Block
-from systems.resection.resection_ik import from_universal
+from systems.resection.wire_drums import AXES
 
 
 @dataclass
@@ -74,6 +74,9 @@ class ElasticWires(Block):
     the translation [N, Nm] (13).
 
     Port ``tension`` emits the tension of wires 0 to 8 [N] (9).
+
+    Port ``travel`` emits the set-point of the translation's servo: position [m],
+    zero (2).
     """
 
     def __init__(
@@ -91,41 +94,45 @@ class ElasticWires(Block):
         straight = wire_lengths(np.zeros(7), self._snake)
         self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
         self._lengths = self.vector_in("lengths", [*(straight - 2e-4), 0.0])
-        self._rates = self.vector_in("rates", [0.0] * 10)
-        inputs = {p.ticket() for p in (self._state, self._lengths, self._rates)}
+        self._rates = self.vector_in("rates", [0.0] * AXES)
+        drums = {self._lengths.ticket(), self._rates.ticket()}
+        inputs = {self._state.ticket(), *drums}
         if self._params.breaks:
             inputs.add(self.time_ticket())
         self._pull = self.cached("pull", self._calc_pull, inputs)
         ticket = {self._pull.ticket()}
         self.vector_out("generalized_force", POSITIONS, self._calc_force, ticket)
         self.vector_out("tension", 9, self._calc_tension, ticket)
+        self.vector_out("travel", 2, self._calc_travel, drums)
 
     def _calc_pull(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Tensions (9) and dL/d(a1, ..., b3), (9, 6)."""
+        """Tensions (9) and torques on a1, b1, ..., b3 (6)."""
         state = self._state.Eval(context)
-        x = state[NEAR]
-        x[1:] = (x[1:] + state[FAR]) / 2
-        v = state[POSITIONS:]
-        ab_rate = (v[NEAR[1:]] + v[FAR]) / 2
-        J = length_jacobian(x[1:], self._snake)
-        stretch = wire_lengths(from_universal(x.tolist()), self._snake)
-        stretch -= self._lengths.Eval(context)[:9]
-        rate = J @ ab_rate - self._rates.Eval(context)[:9]
-        drive = self._drive
-        T = drive.wire_stiffness * stretch + drive.wire_damping * rate
-        np.maximum(T, 0.0, out=T)
+        velocity = state[POSITIONS:]
+        whole = np.ones(9)
         for item in self._params.breaks:
             if context.get_time() >= item.time:
-                T[item.wire] = 0.0
-        return T, J
+                whole[item.wire] = 0.0
+        return elastic_pull(
+            (state[NEAR_ANGLES] + state[FAR]) / 2,
+            (velocity[NEAR_ANGLES] + velocity[FAR]) / 2,
+            self._lengths.Eval(context)[:9],
+            self._rates.Eval(context)[:9],
+            self._snake,
+            self._drive,
+            whole,
+        )
 
     def _calc_force(self, context: Any) -> Sequence[float]:
-        T, J = self._pull.Eval(context)
-        tau = -0.5 * (T @ J)  # the wires turn both balls of a module alike
+        tau = 0.5 * self._pull.Eval(context)[1]  # both balls of a module alike
         force = np.zeros(POSITIONS)
-        force[NEAR[1:]] = tau
+        force[NEAR_ANGLES] = tau
         force[FAR] = tau
         return force.tolist()
 
     def _calc_tension(self, context: Any) -> Sequence[float]:
         return self._pull.Eval(context)[0].tolist()
+
+    def _calc_travel(self, context: Any) -> Sequence[float]:
+        s, rate = self._lengths.Eval(context)[9], self._rates.Eval(context)[9]
+        return [float(s + self._drive.travel_lead * rate), 0.0]

@@ -23,8 +23,8 @@ class ResectionIkParams:
         travel_rate: Largest speed of the translation, in m/s.
     """
 
-    period: float = 0.01
-    bend_rate: float = 1.0
+    period: float = 0.02
+    bend_rate: float = 1.5
     travel_rate: float = 0.03
 
     def check(self) -> None:
@@ -59,23 +59,78 @@ def from_universal(x: Sequence[float]) -> list[float]:
     return q
 
 
-def step_towards(
-    now: Sequence[float], goal: Sequence[float], params: ResectionIkParams
-) -> list[float]:
-    """One period's step on the straight line from x to x_goal, all joints in time.
-
-    In (s, a, b) coordinates: the line stays within the bend's limit, whose cone is
-    convex in them.
-    """
-    most = max(
-        abs(goal[0] - now[0]) / params.travel_rate,
+def time_between(
+    one: Sequence[float], other: Sequence[float], params: ResectionIkParams
+) -> float:
+    """Least time in s from x to another x at full rates, all joints together."""
+    return max(
+        abs(other[0] - one[0]) / params.travel_rate,
         *(
             abs(g - n) / params.bend_rate
-            for n, g in zip(now[1:], goal[1:], strict=True)
+            for n, g in zip(one[1:], other[1:], strict=True)
         ),
     )
-    share = min(params.period / most, 1.0) if most > 0.0 else 1.0
-    return [n + share * (g - n) for n, g in zip(now, goal, strict=True)]
+
+
+def between(one: Sequence[float], other: Sequence[float], share: float) -> list[float]:
+    """The point at a share of the straight line from x to another x.
+
+    It keeps the bend's limit if its ends do: the limit's cone is convex in (a, b).
+    """
+    return [n + share * (g - n) for n, g in zip(one, other, strict=True)]
+
+
+@dataclass
+class Motion:
+    """How a posture follows its goal, all in coordinates x = (s, a1, b1, ..., b3).
+
+    Attributes:
+        x: Where the posture is to be now, (7).
+        goal: What it was last asked for, (7).
+        start: Where the move under way began, (7).
+        elapsed: Time into it in s.
+        duration: Its time in s; 0 if there is none.
+    """
+
+    x: list[float]
+    goal: list[float]
+    start: list[float]
+    elapsed: float = 0.0
+    duration: float = 0.0
+
+    def vector(self) -> list[float]:
+        """As a state vector (23)."""
+        return [*self.x, *self.goal, *self.start, self.elapsed, self.duration]
+
+    @staticmethod
+    def of_vector(v: list[float]) -> "Motion":
+        """From a state vector (23)."""
+        return Motion(v[:7], v[7:14], v[14:21], v[21], v[22])
+
+    def hold(self) -> "Motion":
+        """Stands still from now on."""
+        return Motion(self.x, self.x, self.x)
+
+    def follow(self, goal: list[float], params: ResectionIkParams) -> "Motion":
+        """The motion one period later.
+
+        A goal that moves no faster than the rates allow is met exactly. One that
+        jumps starts a move of smooth speed (a quintic, whose peak is 15/8 of its
+        mean) at whose end it is met.
+        """
+        period = params.period
+        start, elapsed, duration = self.start, self.elapsed, self.duration
+        if time_between(self.goal, goal, params) > period * (1 + 1e-9):
+            start, elapsed = self.x, 0.0
+            duration = 15 / 8 * time_between(self.x, goal, params)
+        if elapsed < duration:
+            elapsed = min(elapsed + period, duration)
+            r = elapsed / duration
+            x = between(start, goal, r * r * r * (10 - 15 * r + 6 * r * r))
+        else:
+            most = time_between(self.x, goal, params)
+            x = between(self.x, goal, min(period / most, 1.0) if most > 0.0 else 1.0)
+        return Motion(x, goal, start, elapsed, duration)
 
 
 class ResectionIk(Block):
@@ -83,8 +138,8 @@ class ResectionIk(Block):
 
     The two redundant freedoms are the intermediate axis, which the target brings
     along. A pose out of reach, or numbers that are not finite, leave the posture
-    where it is. A target that jumps is approached on a straight line in the
-    modules' angles; one that moves slower than the rates allow is met exactly.
+    where it is. A target that moves slower than the rates allow is met exactly; one
+    that jumps is approached smoothly, on a straight line in the modules' angles.
 
     Port ``target`` accepts p_WT [m], tool axis n_WT and intermediate axis n_WI,
     channel frame W (9). The axes need not be unit vectors.
@@ -111,31 +166,35 @@ class ResectionIk(Block):
         self._target = self.vector_in(
             "target", [0.0, 0.0, straight, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]
         )
-        self.DeclareDiscreteState([*universal(posture), 0.0])
+        x = universal(posture)
+        self.DeclareDiscreteState(Motion(x, x, x).vector())
         self._next = self.cached(
             "next", self._calc_next, {self.xd_ticket(), self._target.ticket()}
         )
         ticket = {self._next.ticket()}
         self.vector_out("posture", 7, self._calc_posture, ticket)
         self.vector_out("status", 1, self._calc_status, ticket)
-        self.update_every(self._params.period, self._next.Eval)
+        self.update_every(self._params.period, self._update)
 
-    def _calc_next(self, context: Any) -> Sequence[float]:
-        """Where the posture is to be one period later, and the status."""
+    def _calc_next(self, context: Any) -> tuple[Motion, int]:
+        """The motion one period later, and the status."""
         state = context.get_discrete_state(0).value().tolist()
+        motion = Motion.of_vector(state)
         target = self._target.Eval(context)
         try:
             answer = tool_postures(target[:3], target[3:6], target[6:], self._snake)
         except ValueError:
-            return [*state[:7], HOLD]
+            return motion.hold(), HOLD
         status = int(answer.status)
         if status != REACHED:
-            return [*state[:7], status]
-        goal = universal(answer.q.tolist())
-        return [*step_towards(state[:7], goal, self._params), REACHED]
+            return motion.hold(), status
+        return motion.follow(universal(answer.q.tolist()), self._params), REACHED
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
-        return from_universal(self._next.Eval(context)[:7])
+        return from_universal(self._next.Eval(context)[0].x)
 
     def _calc_status(self, context: Any) -> Sequence[float]:
-        return self._next.Eval(context)[7:]
+        return [float(self._next.Eval(context)[1])]
+
+    def _update(self, context: Any) -> Sequence[float]:
+        return self._next.Eval(context)[0].vector()

@@ -7,7 +7,7 @@ import numpy as np
 
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake import FAR, NEAR, POSITIONS
+from plants.snake.snake import FAR, NEAR, NEAR_ANGLES, POSITIONS
 from systems.common.block import Block
 from systems.resection.resection_ik import from_universal
 
@@ -48,4 +48,4 @@ class SnakeLocation(Block):
 
     def _calc_coupler_error(self, context: Any) -> Sequence[float]:
         x = self._state.Eval(context)
-        return [float(np.abs(x[NEAR[1:]] - x[FAR]).max())]
+        return [float(np.abs(x[NEAR_ANGLES] - x[FAR]).max())]

@@ -26,7 +26,7 @@ class WireDrumsParams:
         margin: Stroke beyond what postures need, for pretension, in m.
     """
 
-    period: float = 0.01
+    period: float = 0.02
     wire_rate: float = 0.05
     travel_rate: float = 0.04
     margin: float = 1.0e-3

@@ -16,7 +16,8 @@ class WireForwardActuation(Block):
     """Bends from wire lengths, module after module (paper, IV.B.2 and IV.C).
 
     The plant's springs stand for wires and drums; their set-point is the posture
-    that the lengths impose, taken ahead by the time that damping lags.
+    that the lengths impose, taken ahead by the time that damping lags and that the
+    integrator holds it.
 
     Port ``lengths`` accepts wires 0 to 8 and the translation [m] (10).
 
@@ -32,12 +33,24 @@ class WireForwardActuation(Block):
     """
 
     def __init__(
-        self, snake: SnakeParams | None = None, drive: SnakeDriveParams | None = None
+        self,
+        snake: SnakeParams | None = None,
+        drive: SnakeDriveParams | None = None,
+        hold: float = 0.0,
     ) -> None:
-        """Makes the block for a snake and its drive."""
+        """Makes the block for a snake and its drive.
+
+        Args:
+            snake: Geometry.
+            drive: Masses and gains.
+            hold: The integrator's step in s: CENIC takes set-points as they are at
+                a step's start, and brings the joints there by its end.
+        """
         super().__init__()
         self._snake = (snake or SnakeParams()).check()
         self._drive = (drive or SnakeDriveParams()).check()
+        self._lead = self._drive.lead + hold
+        self._travel_lead = self._drive.travel_lead + hold
         straight = [*wire_lengths(np.zeros(7), self._snake).tolist(), 0.0]
         self._lengths = self.vector_in("lengths", straight)
         self._rates = self.vector_in("rates", [0.0] * 10)
@@ -60,7 +73,7 @@ class WireForwardActuation(Block):
 
     def _calc_desired_state(self, context: Any) -> Sequence[float]:
         lengths, rates = self._lengths.Eval(context), self._rates.Eval(context)
-        ahead = lengths[:9] + self._drive.lead * rates[:9]
-        s = float(lengths[9] + self._drive.travel_lead * rates[9])
+        ahead = lengths[:9] + self._lead * rates[:9]
+        s = float(lengths[9] + self._travel_lead * rates[9])
         bends = bends_of_lengths(ahead, self._snake)
         return [*universal([s, *bends.q.tolist()]), *[0.0] * 7]

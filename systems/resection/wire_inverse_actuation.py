@@ -24,7 +24,7 @@ class WireInverseActuationParams:
     """
 
     stiffness: float = 0.0
-    least_tension: float = 4.0
+    least_tension: float = 2.0
 
     def check(self) -> None:
         """Raises ValueError for a value that makes no sense."""
@@ -33,6 +33,21 @@ class WireInverseActuationParams:
                 raise ValueError(
                     f"wire_inverse_actuation.{name}={value}: expected >= 0"
                 )
+
+
+def wound_lengths(
+    posture: Sequence[float] | np.ndarray,
+    params: WireInverseActuationParams,
+    snake: SnakeParams,
+) -> list[float]:
+    """Drum positions of a posture (7): wires 0 to 8 and the translation [m] (10)."""
+    q = np.asarray(posture, float)
+    L = wire_lengths(q, snake)
+    if params.stiffness > 0.0:
+        ab = universal(q.tolist())[1:]
+        T = tensions(ab, np.zeros(6), snake, params.least_tension)
+        L = L - T / params.stiffness
+    return [*L.tolist(), float(q[0])]
 
 
 class WireInverseActuation(Block):
@@ -57,14 +72,4 @@ class WireInverseActuation(Block):
         self.vector_out("drums", 10, self._calc_drums, {self._posture.ticket()})
 
     def _calc_drums(self, context: Any) -> Sequence[float]:
-        q = self._posture.Eval(context)
-        L = wire_lengths(q, self._snake)
-        if self._params.stiffness > 0.0:
-            T = tensions(
-                universal(q.tolist())[1:],
-                np.zeros(6),
-                self._snake,
-                self._params.least_tension,
-            )
-            L = L - T / self._params.stiffness
-        return [*L.tolist(), float(q[0])]
+        return wound_lengths(self._posture.Eval(context), self._params, self._snake)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake import NEAR, POSITIONS
+from plants.snake.snake import NEAR_ANGLES, POSITIONS
 from plants.snake.tension import tensions
 from systems.common.block import Block
 
@@ -60,6 +60,6 @@ class WireTension(Block):
         )
 
     def _calc_tension(self, context: Any) -> Sequence[float]:
-        ab = self._state.Eval(context)[NEAR[1:]]
+        ab = self._state.Eval(context)[NEAR_ANGLES]
         tau = self._actuation.Eval(context)[1:]
         return tensions(ab, tau, self._snake, self._params.least).tolist()

@@ -19,7 +19,7 @@ class WireWatchParams:
         samples: Slack samples in a row that raise the alarm.
     """
 
-    period: float = 0.01
+    period: float = 0.02
     least: float = 0.5
     samples: int = 2
 
