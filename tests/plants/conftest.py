@@ -11,9 +11,10 @@ from pydrake.systems.analysis import (
     Simulator,
     SimulatorConfig,
 )
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 import pytest
+from scipy.interpolate import CubicSpline
 
 from plants.abdomen.abdomen import Abdomen, AbdomenParams, add_abdomen, seat_sleeve
 from plants.abdomen.scenery import add_scenery
@@ -62,6 +63,32 @@ class Scene:
         return port.Eval(self.context)[int(self.instrument.sensor.index())]
 
 
+class Follower(LeafSystem):
+    """Sends a joint trajectory's set-points, each held for a period."""
+
+    def __init__(self, servo: SetPoint, path: CubicSpline, period: float) -> None:
+        super().__init__()
+        self._servo, self._path, self._rate = servo, path, path.derivative()
+        self._tool = InstrumentParams()
+        state = self.DeclareDiscreteState(14)
+        self.DeclareStateOutputPort("desired_state", state)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+
+    def _update(self, context: Any, state: Any) -> None:
+        time = context.get_time()
+        q = self._path(time)
+        state.set_value(self._servo(q, self._rate(time), carrying(self._tool, q)))
+
+
+def joint_path(
+    scene_plant: Any, arm: Any, tip: Any, p_WP: Callable, duration: float
+) -> CubicSpline:
+    """Joint angles that carry the tip along p_WP(t) through the origin."""
+    times = np.linspace(0.0, duration, int(50 * duration) + 1)
+    postures = [home_posture(scene_plant, arm, tip, (0, 0, 0), p_WP(t)) for t in times]
+    return CubicSpline(times, postures)
+
+
 def carrying(instrument: InstrumentParams, q: np.ndarray) -> list[float]:
     """Torques that carry the instrument."""
     return payload_torque(q.tolist(), instrument.mass, instrument.centre)
@@ -77,7 +104,8 @@ def make_scene() -> Callable[..., Scene]:
         abdomen_params: AbdomenParams | None = None,
         instrument_params: InstrumentParams | None = None,
         tool_shafts: dict[str, list[float]] | None = None,
-        controller: Callable[[SetPoint, np.ndarray], Any] | None = None,
+        p_WP_of_time: Callable[[float], Any] | None = None,
+        duration: float = 1.0,
         accuracy: float = 1e-3,
         period: float = 1.0 / 120.0,
     ) -> Scene:
@@ -104,16 +132,17 @@ def make_scene() -> Callable[..., Scene]:
             builder, scene_graph, instrument.shaft_geometry, tools.shafts
         )
         wall_force = add_wall_force(builder, plant, abdomen)
-        q0 = home_posture(plant, arm, instrument.tip, aim, p_WP)
         servo = SetPoint(period=period)
-        source = builder.AddNamedSystem(
-            "controller",
-            controller(servo, q0)
-            if controller
-            else ConstantVectorSource(
-                servo(q0, np.zeros(7), carrying(instrument.params, q0))
-            ),
-        )
+        controller: Any
+        if p_WP_of_time:
+            path = joint_path(plant, arm, instrument.tip, p_WP_of_time, duration)
+            q0 = path(0.0)
+            controller = Follower(servo, path, period)
+        else:
+            q0 = home_posture(plant, arm, instrument.tip, aim, p_WP)
+            weight = carrying(instrument.params, q0)
+            controller = ConstantVectorSource(servo(q0, np.zeros(7), weight))
+        source = builder.AddNamedSystem("controller", controller)
         builder.Connect(
             source.get_output_port(), plant.get_desired_state_input_port(arm)
         )

@@ -49,8 +49,8 @@ def test_whole_cone_is_reached_through_the_fulcrum(reach, p_WG):
     for inside in cone_points():
         target = np.array(p_WG) + inside
         q, p, u = reach(p_WG, target)
-        np.testing.assert_allclose(p, target, atol=1e-5)
-        assert np.linalg.norm(np.cross(u, target - p_WG)) < 2e-5
+        np.testing.assert_allclose(p, target, atol=1e-7)
+        assert np.linalg.norm(np.cross(u, target - p_WG)) < 1e-7
         assert u[2] < 0.0
         margin = min(margin, (POSITION_LIMIT - np.abs(q)).min())
     assert math.degrees(margin) > 5.0
