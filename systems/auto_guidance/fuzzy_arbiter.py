@@ -39,7 +39,7 @@ from systems.auto_guidance.signals import (
     usable,
 )
 from systems.common.block import Block
-from systems.common.fuzzy import RuleTable, partition, weighted_average
+from systems.common.fuzzy import Partition, RuleTable
 from systems.common.geometry import (
     Vector,
     all_finite,
@@ -158,20 +158,23 @@ def quadrants(x: float, y: float, moving_speed: float) -> list[float]:
     ]
 
 
-def axes(guide: Sequence[float], u: Sequence[float]) -> tuple[Vector, Vector]:
+def axes(guide: Sequence[float]) -> tuple[Vector, Vector]:
     """The quadrants' axes x, y (unit vectors); see the module.
+
+    Where the tools' axes touch or the goal lies along y, a fixed perpendicular
+    stands in for the direction that is missing.
 
     Args:
         guide: The guide signal (12).
-        u: Unit vector along R's shaft; y is across it where the tools touch,
-            and x is a fixed perpendicular of y where the goal lies along y.
     """
-    y = unit(sub(guide[3:6], guide[0:3]), any_perpendicular(u))
-    goal = sub(guide[9:12], guide[0:3])
+    rx, ry, rz, ox, oy, oz, *_, fx, fy, fz = guide
+    goal = (fx - rx, fy - ry, fz - rz)
+    y = unit((ox - rx, oy - ry, oz - rz), any_perpendicular(goal))
     across = along(goal, -dot(goal, y), y)
-    fallback = any_perpendicular(y)
-    x = unit(across, fallback) if norm(across) > 1e-6 else fallback
-    return x, y
+    size = norm(across)
+    if size < 1e-6:
+        return any_perpendicular(y), y
+    return (across[0] / size, across[1] / size, across[2] / size), y
 
 
 class Decision:
@@ -179,46 +182,36 @@ class Decision:
 
     def __init__(self, params: FuzzyArbiterParams) -> None:
         self._params = params
-        self._table = RuleTable(TABLE_I)
-        self._weights = RuleTable(WEIGHT_TABLE)
-        self._distances = partition(DISTANCES, params.distances)
+        # Table I concludes with a label, not with a number.
+        self._table = RuleTable(TABLE_I, {label: [] for label in DECISIONS})
+        self._weights = RuleTable(WEIGHT_TABLE, WEIGHTS)
+        self._distances = Partition(DISTANCES, params.distances)
 
-    def labels(
-        self, v_r: tuple[float, float], v_o: tuple[float, float]
-    ) -> dict[str, float]:
-        """Degrees of Table I's labels for two velocities on the axes x, y, m/s."""
+    def labels(self, v_r: tuple[float, float], v_o: tuple[float, float]) -> list[float]:
+        """Degrees of DECISIONS for two velocities on the axes x, y, m/s."""
         slow = self._params.moving_speed
         return self._table.activations(quadrants(*v_o, slow), quadrants(*v_r, slow))
 
-    def weights(self, labels: dict[str, float], distance: float) -> list[float]:
-        """(c_1, c_2, c_3) for degrees of the labels at a distance in m."""
-        activations = self._weights.activations(
-            [labels.get(label, 0.0) for label in DECISIONS],
-            self._distances.degrees(distance),
-        )
-        return weighted_average(activations, WEIGHTS)
+    def weights(self, labels: Sequence[float], distance: float) -> list[float]:
+        """(c_1, c_2, c_3) for degrees of DECISIONS at a distance in m."""
+        return self._weights.infer(labels, self._distances.degrees(distance))
 
     def __call__(
-        self,
-        v1: Sequence[float],
-        guide: Sequence[float],
-        robot_tool: Sequence[float],
-        obstacle: Sequence[float],
+        self, v1: Sequence[float], guide: Sequence[float], obstacle: Sequence[float]
     ) -> list[float]:
         """(c_1, c_2, c_3) for finite inputs and a known obstacle."""
+        params = self._params
         v_o = contact_velocity(guide, obstacle)
-        x, y = axes(guide, unit(sub(robot_tool[3:6], robot_tool[0:3])))
-        alert = min(1.0, norm(v_o) / self._params.moving_speed)
+        x, y = axes(guide)
         r_y, o_y = dot(v1, y), dot(v_o, y)
-        if self._params.table == "gated":
-            closing = r_y - o_y
-            alert *= min(1.0, max(0.0, closing / self._params.closing_speed))
+        alert = min(1.0, norm(v_o) / params.moving_speed)
+        if params.table == "gated":
+            alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
         if alert <= 0.0:
             return [1.0, 0.0, 0.0]
         s = guide[7]
         labels = self.labels((dot(v1, x) / s, r_y / s), (dot(v_o, x), o_y))
-        distance = guide[6] - self._params.contact_distance
-        c1, c2, c3 = self.weights(labels, distance)
+        c1, c2, c3 = self.weights(labels, guide[6] - params.contact_distance)
         return [1.0 + alert * (c1 - 1.0), alert * c2, alert * c3]
 
 
@@ -376,6 +369,6 @@ def arbitrate(
         weights = [0.0, 0.0, 0.0]
         change = limited(sub((0.0, 0.0, 0.0), v_tip), params.max_acceleration * dt)
         return weights, along(v_tip, 1.0, change), s
-    weights = decision(velocities[0], guide, robot_tool, obstacle)
+    weights = decision(velocities[0], guide, obstacle)
     s = guide[7]
     return weights, commanded_velocity(params, v_tip, dt, weights, velocities, s), s

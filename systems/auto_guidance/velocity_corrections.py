@@ -24,14 +24,13 @@ from typing import Any
 from systems.auto_guidance.signals import (
     GUIDE_EXAMPLE,
     OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
     acceleration,
     fulcrum,
     usable,
     velocity,
 )
 from systems.common.block import Block
-from systems.common.fuzzy import RuleTable, partition, weighted_average
+from systems.common.fuzzy import Partition, RuleTable
 from systems.common.geometry import Vector, all_finite, along, cross, dot, norm, sub
 
 DISTANCES = ["Z", "AZ", "M", "F", "VF"]
@@ -181,19 +180,16 @@ class SpeedScale:
     """Table II with its memberships: from a crossing to the share of v_1 kept."""
 
     def __init__(self, params: VelocityCorrectionsParams) -> None:
-        self._distances = partition(DISTANCES, params.distances)
-        self._times = partition(TIMES, params.times)
-        self._table = RuleTable(TABLE_II)
-        self._values = {
-            label: [scale] for label, scale in zip(SPEEDS, params.scales, strict=True)
-        }
+        self._distances = Partition(DISTANCES, params.distances)
+        self._times = Partition(TIMES, params.times)
+        scales = {s: [x] for s, x in zip(SPEEDS, params.scales, strict=True)}
+        self._table = RuleTable(TABLE_II, scales)
 
     def __call__(self, distance: float, time: float) -> float:
         """The share in [0, 1] for a crossing `distance` m and `time` s ahead."""
-        activations = self._table.activations(
+        return self._table.infer(
             self._times.degrees(time), self._distances.degrees(distance)
-        )
-        return weighted_average(activations, self._values)[0]
+        )[0]
 
 
 def velocity_correction(
@@ -201,7 +197,6 @@ def velocity_correction(
     scale: SpeedScale,
     v1: Sequence[float],
     guide: Sequence[float],
-    robot_tool: Sequence[float],
     obstacle: Sequence[float],
 ) -> Vector:
     """v_2, m/s; zero where O is not known.
@@ -211,10 +206,9 @@ def velocity_correction(
         scale: Table II.
         v1: Velocity of the guide point, m/s.
         guide: The guide signal (12).
-        robot_tool: G_R, P_R (6), m.
         obstacle: Estimate (17) of O.
     """
-    if not (usable(obstacle) and all_finite(v1, guide, robot_tool)):
+    if not (usable(obstacle) and all_finite(v1, guide)):
         return 0.0, 0.0, 0.0
     distance, time, degree = crossing(guide, v1, obstacle, params)
     if degree <= 0.0:
@@ -231,8 +225,6 @@ class VelocityCorrections(Block):
 
     Port ``v1`` accepts the guide point's velocity v_1 (3), m/s, in W.
     Port ``guide`` accepts the guide signal (12).
-    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
-    (6), m, in W.
     Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
     Port ``v2`` emits the correction v_2 (3), m/s, in W.
     """
@@ -252,7 +244,6 @@ class VelocityCorrections(Block):
         self._scale = SpeedScale(self._params)
         self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
         self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
-        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
         self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
         self.vector_out(
             "v2",
@@ -261,7 +252,6 @@ class VelocityCorrections(Block):
             {
                 self._v1.ticket(),
                 self._guide.ticket(),
-                self._robot_tool.ticket(),
                 self._obstacle.ticket(),
             },
         )
@@ -272,6 +262,5 @@ class VelocityCorrections(Block):
             self._scale,
             self._v1.Eval(context).tolist(),
             self._guide.Eval(context).tolist(),
-            self._robot_tool.Eval(context).tolist(),
             self._obstacle.Eval(context).tolist(),
         )

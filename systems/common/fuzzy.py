@@ -8,9 +8,11 @@ result is the mean of the conclusions weighted by their degrees. That is what
 a Mamdani inference gives for narrow output sets of equal width.
 """
 
+from bisect import bisect
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from math import cos, pi
+from operator import mul
 
 type Membership = Callable[[float], float]
 
@@ -77,81 +79,110 @@ class Variable:
         return [membership(x) for membership in self._memberships]
 
 
-def partition(labels: Sequence[str], centers: Sequence[float]) -> Variable:
-    """Triangles over increasing centers, open shoulders outside; they sum to 1.
+class Partition:
+    """A variable of triangles over increasing centers, open shoulders outside.
 
-    Raises:
-        ValueError: If the centers do not increase or do not match the labels.
-    """
-    if len(labels) != len(centers):
-        raise ValueError(
-            f"{len(centers)} centers {list(centers)} for {len(labels)} labels "
-            f"{list(labels)}"
-        )
-    if not all(a < b for a, b in pairwise(centers)):
-        raise ValueError(f"centers {list(centers)} must increase")
-    low = [-float("inf"), *centers[:-1]]
-    high = [*centers[1:], float("inf")]
-    sets = {}
-    for i, (label, center) in enumerate(zip(labels, centers, strict=True)):
-        b = low[i] if i == 0 else center
-        c = high[i] if i == len(centers) - 1 else center
-        sets[label] = trapezoid(low[i], b, c, high[i])
-    return Variable(sets)
-
-
-class RuleTable:
-    """Two antecedents and a table of conclusions.
+    The memberships of any x sum to 1, and at most two are positive.
 
     Attributes:
-        table: Rows of conclusion labels, as printed.
+        labels: The labels' names, in order.
+        centers: Where each label's membership is 1.
     """
 
-    def __init__(self, table: Sequence[Sequence[str]]) -> None:
-        """Takes the table's cells.
-
-        Args:
-            table: One row per label of the row variable, one column per label
-                of the column variable.
+    def __init__(self, labels: Sequence[str], centers: Sequence[float]) -> None:
+        """Takes labels and centers.
 
         Raises:
-            ValueError: If the rows differ in length.
+            ValueError: If the centers do not increase or do not match the labels.
         """
-        self.table = [list(row) for row in table]
-        if len({len(row) for row in self.table}) != 1:
-            raise ValueError(f"rows of unequal length in {self.table}")
+        if len(labels) != len(centers):
+            raise ValueError(
+                f"{len(centers)} centers {list(centers)} for {len(labels)} labels "
+                f"{list(labels)}"
+            )
+        if not all(a < b for a, b in pairwise(centers)):
+            raise ValueError(f"centers {list(centers)} must increase")
+        self.labels = list(labels)
+        self.centers = list(centers)
 
-    def activations(
-        self, rows: Sequence[float], columns: Sequence[float]
-    ) -> dict[str, float]:
-        """The degree of every conclusion that fires at all."""
-        result: dict[str, float] = {}
-        for row, cells in zip(rows, self.table, strict=True):
-            if row > 0.0:
-                for column, label in zip(columns, cells, strict=True):
-                    degree = row if row < column else column
-                    if degree > result.get(label, 0.0):
-                        result[label] = degree
+    def degrees(self, x: float) -> list[float]:
+        """Membership of x in every label, in the labels' order."""
+        centers = self.centers
+        result = [0.0] * len(centers)
+        i = bisect(centers, x)
+        if i == 0:
+            result[0] = 1.0
+        elif i == len(centers):
+            result[-1] = 1.0
+        else:
+            low = centers[i - 1]
+            share = (x - low) / (centers[i] - low)
+            result[i - 1] = 1.0 - share
+            result[i] = share
         return result
 
 
-def weighted_average(
-    activations: Mapping[str, float], values: Mapping[str, Sequence[float]]
-) -> list[float]:
-    """Mean of the conclusions' values, weighted by their degrees.
+class RuleTable:
+    """Two antecedents, a table of conclusions, and what the conclusions mean.
 
-    Args:
-        activations: Degrees by label, at least one of them positive.
-        values: The conclusions' vectors by label, all of one length.
-
-    Raises:
-        ValueError: If no rule fires.
+    Attributes:
+        conclusions: The conclusions' labels, in the order of `activations`.
     """
-    total = sum(activations.values())
-    if not total > 0.0:
-        raise ValueError("no rule fires: the memberships leave a gap")
-    weighted = [
-        (degree / total, values[label]) for label, degree in activations.items()
-    ]
-    size = len(weighted[0][1])
-    return [sum(w * value[i] for w, value in weighted) for i in range(size)]
+
+    def __init__(
+        self,
+        table: Sequence[Sequence[str]],
+        values: Mapping[str, Sequence[float]],
+    ) -> None:
+        """Takes the table's cells and the conclusions' values.
+
+        Args:
+            table: One row per label of the row variable, one column per label
+                of the column variable; each cell a conclusion's label.
+            values: The conclusions' vectors by label, all of one length.
+
+        Raises:
+            ValueError: If the rows differ in length, a cell has no value or the
+                values differ in length.
+        """
+        if len({len(row) for row in table}) != 1:
+            raise ValueError(f"rows of unequal length in {table}")
+        unknown = {cell for row in table for cell in row} - set(values)
+        if unknown:
+            raise ValueError(
+                f"no value for {sorted(unknown)}; values are there for {list(values)}"
+            )
+        if len({len(value) for value in values.values()}) != 1:
+            raise ValueError(f"values of unequal length in {dict(values)}")
+        self.conclusions = list(values)
+        index = {label: i for i, label in enumerate(self.conclusions)}
+        self._cells = [[index[cell] for cell in row] for row in table]
+        # One list per component of the values, in the conclusions' order.
+        self._components = [list(c) for c in zip(*values.values(), strict=True)]
+
+    def activations(
+        self, rows: Sequence[float], columns: Sequence[float]
+    ) -> list[float]:
+        """The degree of every conclusion, from the antecedents' degrees."""
+        result = [0.0] * len(self.conclusions)
+        active = [(j, degree) for j, degree in enumerate(columns) if degree > 0.0]
+        for i, row in enumerate(rows):
+            if row > 0.0:
+                cells = self._cells[i]
+                for j, column in active:
+                    degree = row if row < column else column
+                    if degree > result[cells[j]]:
+                        result[cells[j]] = degree
+        return result
+
+    def infer(self, rows: Sequence[float], columns: Sequence[float]) -> list[float]:
+        """Mean of the conclusions' values, weighted by their degrees.
+
+        Raises:
+            ValueError: If no rule fires.
+        """
+        degrees = self.activations(rows, columns)
+        total = sum(degrees)
+        if not total > 0.0:
+            raise ValueError("no rule fires: the memberships leave a gap")
+        return [sum(map(mul, degrees, c)) / total for c in self._components]
