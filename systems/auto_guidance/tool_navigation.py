@@ -19,6 +19,9 @@ from systems.common.block import Block
 from systems.common.geometry import Vector
 
 MOVING = 0
+WAITING = 7
+NEVER_SEEN = 1.0
+"""An estimate's standard deviation before the tool was ever seen [m]."""
 REASONS = {
     1: "target lost by the tracker",
     2: "obstacle lost by the tracker",
@@ -26,6 +29,7 @@ REASONS = {
     4: "target out of reach",
     5: "target outside the view cone",
     6: "arm does not follow",
+    7: "waiting for the tracker's first frame",
 }
 """Why the robot stands: the code on port ``stop`` and its text."""
 
@@ -49,7 +53,7 @@ class ToolNavigationParams:
     """
 
     period: float = 1.0 / 60.0
-    tip_speed: float = 0.06
+    tip_speed: float = 0.1
     turning_speed: float = 1.0
     acceleration: float = 1.0
     min_insertion: float = 0.03
@@ -270,6 +274,8 @@ class ToolNavigation(Block):
         p: Vector,
     ) -> int:
         """Why the tool must stop, or MOVING."""
+        if target[12] >= NEVER_SEEN or obstacle[12] >= NEVER_SEEN:
+            return WAITING
         if target[15] < 0.5:
             return 1
         if obstacle[15] < 0.5:
