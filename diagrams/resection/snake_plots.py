@@ -80,6 +80,7 @@ def pose_errors(run: Any) -> Figure:
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     lower.semilogy(time, np.degrees(angle), color=COLORS["target"], lw=1.0)
     lower.set(ylabel="axis error [deg]", xlabel="time [s]")
+    lower.set_ylim(bottom=max(1e-3, lower.get_ylim()[0]))
     if not flags.all():
         edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
         for first, last in edges.reshape(-1, 2):
@@ -131,7 +132,7 @@ def break_closeup(run: Any) -> Figure:
     lower.plot(time[near], np.abs(rates).max(axis=1) * MM, color=COLORS["robot"])
     lower.set(ylabel="fastest drum [mm/s]", xlabel="time [s]", ylim=(0, None))
     _events(run, upper, lower)
-    upper.legend(loc="upper left")
+    upper.legend(loc="center right")
     return figure
 
 

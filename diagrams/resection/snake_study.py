@@ -28,7 +28,7 @@ SIGNALS = {
     "drums.limited": ("code",),
     "wires.residual": ("module1", "module2", "module3"),
     "wires.tension": NINE,
-    "watch.alarm": ("time", "wire"),
+    "watch.alarm": ("time", "module"),
 }
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""

@@ -36,12 +36,16 @@ class WireWatchParams:
 class WireWatch(Block):
     """Raises an alarm, and keeps it, once a wire has been slack for some samples.
 
+    A wire that snaps lets the other two of its module go slack within a
+    millisecond or two, and wires beyond it may follow: what can be told is the
+    module, the one nearest to the base that has a slack wire.
+
     Port ``tension`` accepts the tension of wires 0 to 8, as load cells at the drums
     measure them [N] (9).
 
     Port ``stop`` emits 0, and 1 from the alarm on (1).
 
-    Port ``alarm`` emits the alarm's time [s] and the wire, or -1 and -1 (2).
+    Port ``alarm`` emits the alarm's time [s] and the module, 1 to 3, or -1 and -1 (2).
     """
 
     def __init__(self, params: WireWatchParams | None = None) -> None:
@@ -61,5 +65,5 @@ class WireWatch(Block):
         count = np.where(slack, before + 1.0, 0.0)
         alarm = context.get_discrete_state(self._alarm).value().tolist()
         if alarm[0] < 0.0 and count.max() >= self._params.samples:
-            alarm = [context.get_time(), float(count.argmax())]
+            alarm = [context.get_time(), float(count.argmax() // 3 + 1)]
         return count.tolist(), alarm, [float(alarm[0] >= 0.0)]
