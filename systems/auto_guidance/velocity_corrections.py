@@ -60,7 +60,7 @@ class VelocityCorrectionsParams:
         acceleration_time: Time constant with which O's acceleration is taken to
             die out, s.
         moving_speed: Speed of O's tip from which on corrections count in full,
-            m/s; in proportion below.
+            m/s; not at all below half of it.
         miss_distance: How near a miss must be to count, m.
     """
 
@@ -167,7 +167,7 @@ def crossing(
         _ramp((norm(a) + miss - reach * norm(a)) / miss),
         _ramp((time + 0.1) / 0.1),
         _ramp(4.0 * (params.horizon - time) / params.horizon),
-        _ramp(norm(velocity(obstacle)) / params.moving_speed),
+        _ramp(2.0 * norm(velocity(obstacle)) / params.moving_speed - 1.0),
     )
     return max(distance, 0.0), max(time, 0.0), degree
 

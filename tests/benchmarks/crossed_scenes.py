@@ -35,6 +35,7 @@ CONTACT = 0.005
 KINDS = ("standing", "moving")
 _WANDER_TIME = 7.0
 _ACCELERATION = 0.4
+_TRIES = 1000
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,7 @@ def _draw(rng: np.random.Generator, moving: bool) -> Scene | None:
             return None
         return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
     legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
-    return Scene(g_r, start, goal, g_o, legs)
+    return Scene(g_r, start, goal, g_o, legs) if legs else None
 
 
 def _fulcrum(rng: np.random.Generator, dome: float) -> Vector:
@@ -193,11 +194,14 @@ def _wander(
     goal: Vector,
     from_g_r: float,
 ) -> list[Leg]:
-    """Legs between random points for 7 s, the last one to a place out of the way."""
+    """Legs between random points for 7 s, the last one to a place out of the way.
+
+    Empty if none is found: O may stand where every way leads too close to G_R.
+    """
     speed = float(rng.uniform(0.01, 0.06))
     legs: list[Leg] = []
     time = 0.0
-    while True:
+    for _ in range(_TRIES):
         p0 = legs[-1].p1 if legs else tip
         leg = Leg(time, p0, _tip(rng, dome, g_o), speed)
         if any(
@@ -213,3 +217,4 @@ def _wander(
         time = leg.end
         if last:
             return legs
+    return []
