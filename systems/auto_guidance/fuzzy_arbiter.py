@@ -203,10 +203,12 @@ class Decision:
         """(c_1, c_2, c_3) for finite inputs and a known obstacle."""
         params = self._params
         v_o = contact_velocity(guide, obstacle)
+        # The tremor and the estimate's noise of a tool at rest do not count.
+        alert = min(1.0, 2.0 * norm(v_o) / params.moving_speed - 1.0)
+        if alert <= 0.0:
+            return [1.0, 0.0, 0.0]
         x, y = axes(guide)
         r_y, o_y = dot(v1, y), dot(v_o, y)
-        # The tremor and the estimate's noise of a tool at rest do not count.
-        alert = min(1.0, max(0.0, 2.0 * norm(v_o) / params.moving_speed - 1.0))
         if params.table == "gated":
             alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
         if alert <= 0.0:

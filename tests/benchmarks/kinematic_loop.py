@@ -13,7 +13,6 @@ from typing import Protocol
 from systems.auto_guidance.backward_movement import (
     BackwardMovementParams,
     backward_movement,
-    contact_velocity,
 )
 from systems.auto_guidance.fuzzy_arbiter import (
     Decision,
@@ -112,8 +111,7 @@ class LocalPlanner:
         self.v2 = velocity_correction(
             self.corrections, self._scale, self.v1, self.guide, obstacle
         )
-        v_o = contact_velocity(self.guide, obstacle)
-        self.v3 = backward_movement(self.backward, self.v3, dt, v_o)
+        self.v3 = backward_movement(self.backward, self.v3, dt, self.guide, obstacle)
         self.weights, self._v_tip, _ = arbitrate(
             self.arbiter,
             self._decision,
