@@ -65,6 +65,17 @@ class Leg:
         """Time of arrival, s."""
         return self.start + self._shape()[2]
 
+    def shortened(self, end: float) -> "Leg":
+        """The same way, only as far as brings it to rest at the time `end`."""
+        left = end - self.start
+        ramp = self.speed / _ACCELERATION
+        if left >= 2.0 * ramp:
+            way = self.speed * (left - ramp)
+        else:
+            way = _ACCELERATION * (0.5 * left) ** 2
+        d = sub(self.p1, self.p0)
+        return Leg(self.start, self.p0, along(self.p0, way / norm(d), d), self.speed)
+
     def at(self, time: float) -> tuple[Vector, Vector, Vector]:
         """Position, velocity and acceleration at `time`."""
         length, peak, duration = self._shape()
@@ -204,13 +215,15 @@ def _wander(
     for _ in range(_TRIES):
         p0 = legs[-1].p1 if legs else tip
         leg = Leg(time, p0, _tip(rng, dome, g_o), speed)
+        last = leg.end >= _WANDER_TIME
+        if last:
+            leg = leg.shortened(_WANDER_TIME)
         if any(
             closest_on_segment(g_r, g_o, along(p0, k / 20, sub(leg.p1, p0)))[1]
             < from_g_r
             for k in range(21)
         ):
             continue
-        last = leg.end >= _WANDER_TIME
         if last and closest_points(g_r, goal, g_o, leg.p1)[2] < CONTACT + 0.003:
             continue
         legs.append(leg)
