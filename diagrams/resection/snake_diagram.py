@@ -32,7 +32,6 @@ WIRES = (
     ("resection_ik.posture", "wire_inverse_actuation.posture"),
     ("wire_inverse_actuation.drums", "wire_drums.command"),
     # The lengths impose a posture.
-    ("wire_drums.lengths", "wire_forward_actuation.lengths"),
     ("wire_drums.rates", "wire_forward_actuation.rates"),
     # Where the snake is, and whether a wire is slack.
     ("plant.snake_state", "snake_location.state"),
@@ -41,6 +40,7 @@ WIRES = (
 """Signals of both wire models."""
 
 DRUM_WIRES = (
+    ("wire_drums.lengths", "wire_forward_actuation.lengths"),
     ("wire_forward_actuation.desired_state", "plant.snake_desired_state"),
     ("plant.snake_state", "wire_tension.state"),
     ("plant.snake_net_actuation", "wire_tension.net_actuation"),
@@ -48,6 +48,7 @@ DRUM_WIRES = (
 )
 
 ELASTIC_WIRES = (
+    ("elastic_wires.measured", "wire_forward_actuation.lengths"),
     ("elastic_wires.travel", "plant.snake_desired_state"),
     ("plant.snake_state", "elastic_wires.state"),
     ("wire_drums.lengths", "elastic_wires.lengths"),

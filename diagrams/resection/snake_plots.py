@@ -116,23 +116,30 @@ def wires(run: Any) -> Figure:
 
 
 def break_closeup(run: Any) -> Figure:
-    """Tensions and tip speed around the instant at which a wire snaps."""
-    figure = new_figure(7.0, 4.6)
+    """Tensions, residual and drums around the instant at which a wire snaps."""
+    figure = new_figure(7.4, 6.0)
     time, snapped = run.signals["time"], break_time(run.scenario) or 0.0
-    near = (time > snapped - 0.3) & (time < snapped + 0.6)
-    upper = add_axes(figure, 2, 1, 1)
+    near = (time > snapped - 0.2) & (time < snapped + 0.4)
+    top = add_axes(figure, 3, 1, 1)
     tension = run.matrix("wires.tension")[near]
     for w in range(WIRES * MODULES):
         style = {"color": MODULE_COLORS[w // WIRES], "ls": STYLES[w % WIRES]}
-        upper.plot(time[near], tension[:, w], lw=1.2, **style)
-    upper.axhline(run.scenario.watch.least, color=COLORS["muted"], lw=0.8)
-    upper.set(ylabel="tension [N]", ylim=(0, None))
-    lower = add_axes(figure, 2, 1, 2, sharex=upper)
+        top.plot(time[near], tension[:, w], lw=1.2, **style)
+    top.axhline(run.scenario.watch.least, color=COLORS["muted"], lw=0.8)
+    top.set(ylabel="tension [N]", ylim=(0, None))
+    middle = add_axes(figure, 3, 1, 2, sharex=top)
+    residual = np.abs(run.matrix("wires.residual")[near])
+    for m in range(MODULES):
+        color, label = MODULE_COLORS[m], f"module {m + 1}"
+        middle.semilogy(time[near], residual[:, m] + 1e-9, color=color, label=label)
+    middle.set(ylabel="wires disagree")
+    middle.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    bottom = add_axes(figure, 3, 1, 3, sharex=top)
     rates = np.gradient(run.matrix("drums.lengths"), time, axis=0)[near]
-    lower.plot(time[near], np.abs(rates).max(axis=1) * MM, color=COLORS["robot"])
-    lower.set(ylabel="fastest drum [mm/s]", xlabel="time [s]", ylim=(0, None))
-    _events(run, upper, lower)
-    upper.legend(loc="center right")
+    bottom.plot(time[near], np.abs(rates).max(axis=1) * MM, color=COLORS["robot"])
+    bottom.set(ylabel="fastest drum [mm/s]", xlabel="time [s]", ylim=(0, None))
+    _events(run, top, middle, bottom)
+    bottom.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 

@@ -36,7 +36,7 @@ class SnakeDriveParams:
     tool_mass: float = 5.0e-4
     carriage_mass: float = 0.05
     wire_stiffness: float = 2.0e4
-    wire_damping: float = 4.0
+    wire_damping: float = 2.0
 
     def check(self) -> "SnakeDriveParams":
         """Returns itself if all values are positive.

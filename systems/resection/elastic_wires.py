@@ -60,7 +60,7 @@ class ElasticWires(Block):
         T = max(0, k (L - L_d) + c (dL/dt - dL_d/dt)),   tau = -(dL/dq)^T T,
 
     and a broken one not at all. It stands beside the drum model as its validation;
-    explicit in the integrator, it needs steps of 0.2 ms.
+    explicit in the integrator, it needs short steps, 0.4 ms at most.
 
     Port ``state`` accepts the plant's positions, then velocities, of the snake [m,
     rad, m/s, rad/s] (26).
@@ -74,6 +74,10 @@ class ElasticWires(Block):
     the translation [N, Nm] (13).
 
     Port ``tension`` emits the tension of wires 0 to 8 [N] (9).
+
+    Port ``measured`` emits the length of each wire's path as drums with load cells
+    see it, wound out plus stretch T/k, and the translation [m] (10). A slack wire's
+    is wrong, and does not fit its module's others.
 
     Port ``travel`` emits the set-point of the translation's servo: position [m],
     zero (2).
@@ -103,6 +107,8 @@ class ElasticWires(Block):
         ticket = {self._pull.ticket()}
         self.vector_out("generalized_force", POSITIONS, self._calc_force, ticket)
         self.vector_out("tension", 9, self._calc_tension, ticket)
+        measured = {self._lengths.ticket(), *ticket}
+        self.vector_out("measured", AXES, self._calc_measured, measured)
         self.vector_out("travel", 2, self._calc_travel, drums)
 
     def _calc_pull(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -132,6 +138,11 @@ class ElasticWires(Block):
 
     def _calc_tension(self, context: Any) -> Sequence[float]:
         return self._pull.Eval(context)[0].tolist()
+
+    def _calc_measured(self, context: Any) -> Sequence[float]:
+        lengths = self._lengths.Eval(context)
+        lengths[:9] += self._pull.Eval(context)[0] / self._drive.wire_stiffness
+        return lengths.tolist()
 
     def _calc_travel(self, context: Any) -> Sequence[float]:
         s, rate = self._lengths.Eval(context)[9], self._rates.Eval(context)[9]

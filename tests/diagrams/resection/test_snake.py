@@ -51,6 +51,10 @@ def test_a_broken_wire_is_noticed_and_motion_stops(break_run):
     lengths = break_run.matrix("drums.lengths")[after]
     assert np.abs(np.diff(lengths, axis=0)).max() == 0.0
     assert figures["min_tension"] > 0.5
+    residual = np.abs(break_run.matrix("wires.residual")[:, 1])
+    before = break_run.signals["time"] < 1.0
+    assert residual[before].max() < 1e-6  # all wires taut: they agree
+    assert residual[after].max() > 1e-3
     assert "break" in plots(break_run)
 
 

@@ -230,7 +230,10 @@ def test_elastic_wires_push_both_balls_alike_and_snap():
     np.testing.assert_array_equal(force[NEAR[1:]], force[FAR])
     assert force[0] == 0.0
     assert out(dut, context, "travel")[0] == pytest.approx(0.01)
+    measured = out(dut, context, "measured")
+    np.testing.assert_allclose(measured[:9], wire_lengths(POSTURE, SNAKE), atol=1e-15)
     context.SetTime(2.0)
+    assert out(dut, context, "measured")[1] == lengths[1]
     assert out(dut, context, "tension")[1] == 0.0
 
 
