@@ -60,6 +60,20 @@ class Study:
     frame_rate: float = 30.0
 
 
+def build(scenario: Any) -> Any:
+    """Makes a scenario's diagram.
+
+    Raises:
+        ScenarioError: If a block or a plant refuses one of its parameters.
+    """
+    try:
+        return get_study(scenario.system).make_diagram(scenario)
+    except ScenarioError:
+        raise
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+
+
 def get_study(name: Any) -> Study:
     """The study of a name.
 

@@ -107,7 +107,12 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
     if s.recording:
         obstacle.recording = s.recording
     estimators = [
-        replace(s.estimator, fulcrum=tool.p_WG if s.known_fulcrums else None)
+        replace(
+            s.estimator,
+            body=s.tracker.body,  # the estimators know the tracker they listen to
+            period=s.tracker.period,
+            fulcrum=tool.p_WG if s.known_fulcrums else None,
+        )
         for tool in (target, obstacle)
     ]
     return {
@@ -121,13 +126,13 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
         "fulcrum": ConstantVectorSource(s.robot.p_WG),
-        "robot_location": RobotLocation(),
+        "robot_location": RobotLocation(s.instrument),
         "go_to_target": GoToTarget(s.go_to_target),
         "velocity_corrections": VelocityCorrections(s.velocity_corrections),
         "backward_movement": BackwardMovement(s.backward_movement),
         "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter),
         "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
-        "joint_commands": JointCommands(s.joints, posture, s.arm),
+        "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
 
 

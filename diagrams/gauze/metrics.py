@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from systems.auto_guidance.tool_navigation import REASONS
+from systems.auto_guidance.tool_navigation import REASONS, WAITING
 
 REACHED_DISTANCE = 0.002
 """The gauze is delivered while the tip is this close to S's true tip [m] ..."""
@@ -27,9 +27,14 @@ def time_to_target(time: np.ndarray, tip_error: np.ndarray) -> float | None:
 
 
 def stops(time: np.ndarray, codes: np.ndarray) -> list[dict[str, Any]]:
-    """Every stop of the robot: reason, start [s] and duration [s]."""
+    """Every stop of the robot: reason, start [s] and duration [s].
+
+    Waiting for the tracker's first frame is no stop: the robot has not moved yet.
+    """
     found = []
     for code, reason in REASONS.items():
+        if code == WAITING:
+            continue
         for first, last in spans(np.round(codes) == code):
             end = time[min(last + 1, len(time) - 1)]
             start = float(time[first])

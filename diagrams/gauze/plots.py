@@ -120,7 +120,9 @@ def virtual_force(run: Any) -> Figure:
     p_WO = run.matrix("obstacle.shaft")[index, :3] * MM
     p_WS = run.matrix("target.shaft")[index, :3] * MM
     p_WGO = _fulcrum(run, "obstacle") * MM
-    M_R, M_O = map(np.array, closest_points(p_WG, p_WP, p_WGO, p_WO)[:2])
+    M_R, M_O = map(
+        np.array, closest_points(*(x.tolist() for x in (p_WG, p_WP, p_WGO, p_WO)))[3:]
+    )
     s = np.linalg.norm(M_R - p_WG) / np.linalg.norm(p_WP - p_WG)
     M_Rf = p_WG + s * (p_WS - p_WG)
     _shaft(axes, p_WG, p_WP, color=COLORS["robot"], lw=4, label="robot's tool R")

@@ -118,12 +118,12 @@ def _check_fulcrums(scenario: GauzeScenario) -> None:
 def _check_reach(scenario: GauzeScenario) -> None:
     """The start and S's first tip must be reachable and in view."""
     limits = scenario.navigation
-    p_WG = tuple(scenario.robot.p_WG)
+    p_WG = scenario.robot.p_WG
     for name, point in (
         ("robot.p_WP", scenario.robot.p_WP),
         ("target.points[0]", scenario.target.points[0]),
     ):
-        if not reachable(limits, p_WG, tuple(point)):
+        if not reachable(limits, p_WG, point):
             raise ScenarioError(
                 f"{name}={point} is out of reach through robot.p_WG="
                 f"{scenario.robot.p_WG}: expected an insertion in "
@@ -135,7 +135,7 @@ def _check_reach(scenario: GauzeScenario) -> None:
     axis = [p - a for p, a in zip(scenario.camera.p_WS, apex, strict=True)]
     length = math.hypot(*axis)
     cone = [*apex, *(x / length for x in axis), scenario.camera.half_angle]
-    if cone_angle(cone, tuple(start)) > scenario.camera.half_angle:
+    if cone_angle(cone, start) > scenario.camera.half_angle:
         raise ScenarioError(
             f"target.points[0]={start} lies outside the view cone of half angle "
             f"{scenario.camera.half_angle} rad about camera.p_WS={scenario.camera.p_WS}"

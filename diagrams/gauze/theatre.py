@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 
 from plants.abdomen.abdomen import add_abdomen, seat_sleeve
 from plants.abdomen.scenery import add_scenery
@@ -13,6 +12,7 @@ from plants.arm.arm import add_arm
 from plants.arm.parameters import BASE_POSITION
 from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
+from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.clearance import add_clearance
 from plants.instruments.instrument import add_instrument
 from plants.instruments.posed_tools import PosedToolsParams, add_posed_tools
@@ -43,7 +43,7 @@ def add_theatre(builder: Any, scenario: Any) -> Theatre:
     Raises:
         ValueError: If the start cannot be reached.
     """
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    plant, scene_graph = add_plant_and_scene(builder)
     arm = add_arm(plant, params=scenario.arm)
     instrument = add_instrument(
         plant, plant.GetFrameByName("flange", arm), scenario.instrument
@@ -53,6 +53,7 @@ def add_theatre(builder: Any, scenario: Any) -> Theatre:
     )
     add_scenery(plant, BASE_POSITION)
     plant.Finalize()
+    connect_poses(builder, plant, scene_graph)
     posture = home_posture(
         plant, arm, instrument.tip, scenario.robot.p_WG, scenario.robot.p_WP
     )

@@ -7,8 +7,8 @@ freely only the part across the shaft is left at rest:
     f = -K (p_c - I)_perp - D d/dt (p_c - I)_perp
 
 is what the wall does to the shaft, p_c being the shaft's point nearest the fulcrum
-I. Along the shaft there is only the seal's dry friction, 0.25 to 3 N in the
-literature. Lateral trocar stiffness was not found in vivo: sweep 100 to 3000 N/m.
+I. Along the shaft there is only the seal's friction, 0.25 to 3 N in the literature,
+most of it dry. Lateral trocar stiffness was not found in vivo: sweep 100 to 3000 N/m.
 """
 
 from collections.abc import Sequence
@@ -41,9 +41,11 @@ class AbdomenParams:
 
     Attributes:
         stiffness: K, lateral stiffness of the trocar, in N/m.
-        damping: D, in N s/m.
+        damping: D, in N s/m. Over 10, CENIC needs more steps, or a heavier sleeve.
         seal_friction: Dry friction along the shaft, in N; 0 for none.
-        sleeve_mass: In kg; light, for its inertia is felt by the sensor.
+        seal_viscosity: Friction along the shaft that grows with speed, in N s/m.
+        sleeve_mass: In kg. Light, for the sensor feels its inertia; below 20 g the
+            sleeve on a stiff trocar makes CENIC halve its steps.
         wall_mass: In kg.
         wall_stiffness: Of the servos that place the wall, in N/m.
     """
@@ -51,7 +53,8 @@ class AbdomenParams:
     stiffness: float = 500.0
     damping: float = 5.0
     seal_friction: float = 0.5
-    sleeve_mass: float = 0.005
+    seal_viscosity: float = 2.0
+    sleeve_mass: float = 0.02
     wall_mass: float = 0.5
     wall_stiffness: float = 2e5
 
@@ -59,9 +62,10 @@ class AbdomenParams:
         """Raises ValueError for a value that cannot be."""
         bounds = {
             "stiffness": (1.0, 1e5),
-            "damping": (0.0, 1e3),
+            "damping": (0.0, 100.0),
             "seal_friction": (0.0, 20.0),
-            "sleeve_mass": (0.001, 0.1),
+            "seal_viscosity": (0.0, 100.0),
+            "sleeve_mass": (0.005, 0.2),
             "wall_mass": (0.05, 10.0),
             "wall_stiffness": (1e3, 1e6),
         }
@@ -139,7 +143,13 @@ def add_abdomen(
         SpatialInertia.SolidSphereWithMass(params.sleeve_mass, 0.01),
     )
     joint = plant.AddJoint(
-        PrismaticJoint("sleeve", shaft, sleeve.body_frame(), [0.0, 0.0, 1.0])
+        PrismaticJoint(
+            "sleeve",
+            shaft,
+            sleeve.body_frame(),
+            [0.0, 0.0, 1.0],
+            damping=params.seal_viscosity,
+        )
     )
     if params.seal_friction > 0.0:
         # A servo of zero speed whose torque saturates is dry friction.

@@ -6,14 +6,14 @@ from typing import Any
 from pydrake.geometry import Box, Cylinder, Ellipsoid
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plants.common.looks import BOWEL, DRAPE, LIVER, PEDESTAL, draw
+from plants.common.looks import DRAPE, GALL, LIVER, PEDESTAL, TISSUE, draw
 
 FLOOR = -0.85
 """Height of the floor in the world, in m."""
 
 
 def add_scenery(plant: Any, p_WB: Sequence[float]) -> None:
-    """Draws a draped table, a few organs and a stand under the arm.
+    """Draws a draped table, tissue, liver and a stand under the arm.
 
     Args:
         plant: A MultibodyPlant that is not yet finalized, with a SceneGraph.
@@ -23,10 +23,9 @@ def add_scenery(plant: Any, p_WB: Sequence[float]) -> None:
     for name, shape, p, yaw, rgba in (
         ("table", Box(0.56, 1.30, 0.06), [0.0, 0.0, -0.27], 0.0, DRAPE),
         ("table_foot", Box(0.30, 0.50, 0.55), [0.0, 0.0, -0.575], 0.0, PEDESTAL),
-        ("liver", Ellipsoid(0.075, 0.10, 0.035), [0.03, 0.13, -0.205], 0.4, LIVER),
-        ("bowel_1", Ellipsoid(0.11, 0.035, 0.028), [0.0, 0.02, -0.212], 0.2, BOWEL),
-        ("bowel_2", Ellipsoid(0.11, 0.035, 0.028), [0.01, -0.05, -0.212], -0.1, BOWEL),
-        ("bowel_3", Ellipsoid(0.10, 0.035, 0.028), [-0.01, -0.12, -0.212], 0.15, BOWEL),
+        ("tissue", Ellipsoid(0.215, 0.274, 0.036), [0.0, 0.0, -0.240], 0.0, TISSUE),
+        ("liver", Ellipsoid(0.075, 0.11, 0.034), [0.05, 0.12, -0.208], 0.4, LIVER),
+        ("gall", Ellipsoid(0.030, 0.015, 0.014), [0.02, 0.015, -0.200], 0.9, GALL),
     ):
         draw(
             plant,

@@ -18,7 +18,6 @@ from pydrake.geometry import (
     GeometryFrame,
     GeometryInstance,
     GeometrySet,
-    MeshcatCone,
     ProximityProperties,
     Shape,
     Sphere,
@@ -26,6 +25,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, LeafSystem
 
+from plants.common.lathe import lathe
 from plants.common.looks import DARK, GREEN, RED, STEEL, TROCAR, VIEW, illustration
 
 NAMES = ("S", "O", "C")
@@ -158,16 +158,14 @@ class PosedTools(LeafSystem):
 
         looks: Sequence[tuple[str, Shape, float, list[float]]]
         if scope:
-            view = MeshcatCone(
-                p.view_length,
-                *[p.view_length * math.tan(p.view_half_angle)] * 2,
-            )
+            wide = p.view_length * math.tan(p.view_half_angle)
+            cone = [(0.0, 0.0), (wide, p.view_length)]
             looks = (
                 ("tube", Cylinder(radius, length), -0.5 * length, DARK),
                 ("lens", Cylinder(0.8 * radius, 0.001), 0.0, STEEL),
                 ("coupler", Cylinder(0.014, 0.03), -length - 0.015, STEEL),
                 ("head", Cylinder(0.022, 0.06), -length - 0.06, DARK),
-                ("view", view, 0.0, VIEW),
+                ("view", lathe(cone, "view"), 0.0, VIEW),
             )
         else:
             rgba = GREEN if name == "S" else RED

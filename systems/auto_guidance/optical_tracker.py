@@ -168,14 +168,15 @@ class OpticalTracker(Block):
     invalid. Noise is white; a real tracker's has a slow part as well, which no filter
     removes and which is left out here.
 
-    Ports ``S`` and ``O`` accept the true shafts (6 each): p_WP in m and unit vector
-    u_W, world frame W. Port ``noise`` accepts twelve independent standard normal
-    numbers, renewed every period, six for S and six for O. It is declared as Drake's
-    Gaussian random input: `AddRandomInputs(params.period, builder)`, or a
-    `RandomSource` of that period, feeds it, and `SetRandomContext` seeds it; zeros
-    give a tracker without noise. Ports ``S_measured`` and ``O_measured`` emit the
-    last delivered frame (8 each): p_WP in m, u_W, the time of its exposure in s (-1
-    before the first frame), and 1 if valid or 0.
+    Port ``S`` accepts the target tool's true shaft (6): p_WP in m and unit vector u_W,
+    world frame W. Port ``O`` accepts the obstacle tool's, likewise (6). Port ``noise``
+    accepts twelve independent standard normal numbers, renewed every period, six for S
+    and six for O. It is declared as Drake's Gaussian random input:
+    `AddRandomInputs(params.period, builder)`, or a `RandomSource` of that period,
+    feeds it, and `SetRandomContext` seeds it; zeros give a tracker without noise.
+    Port ``S_measured`` emits the last delivered frame of S (8): p_WP in m, u_W, the
+    time of its exposure in s (-1 before the first frame), and 1 if valid or 0.
+    Port ``O_measured`` emits that of O, likewise (8).
 
     Args:
         params: Rate, latency, markers, losses of sight.

@@ -12,6 +12,18 @@ from pathlib import Path
 import numpy as np
 
 COLUMNS = ("t", "x", "y", "z")
+
+SWEEP_SEED = 73
+SWEEP_VIA = (
+    (-0.030, 0.020, -0.100),
+    (0.035, -0.010, -0.110),
+    (-0.010, -0.020, -0.090),
+    (0.030, 0.030, -0.120),
+)
+"""`synthesize_sweep(SWEEP_SEED, SWEEP_VIA)` is the recording that ships with trocar,
+`diagrams/gauze/recordings/obstacle_sweep.csv`: the obstacle tool works to and fro
+across the middle of the cavity."""
+
 _LARGEST_COORDINATE = 2.0  # m; beyond it the file is most likely in mm
 
 
@@ -104,7 +116,8 @@ def synthesize_sweep(
     that overlap, and rests in between. Here stroke after stroke goes a random part
     of the way to the next point, a little beside it; peak speeds are log-normal, so
     that the speeds have the heavy tail of a surgeon's: mean about 10 mm/s, 95th
-    percentile about 36 mm/s, 99th about 57 mm/s. Tremor of 8 to 12 Hz is added.
+    percentile 36 mm/s, 99th 57 mm/s. No stroke is shorter than 0.6 s, so that 99 % of
+    the power lies below 2 Hz. Tremor of 8 to 12 Hz is added.
 
     Args:
         seed: Same seed, same motion.
@@ -127,8 +140,8 @@ def synthesize_sweep(
             goal += 1
             continue
         step = way * rng.uniform(0.2, 0.7) + rng.normal(0.0, 0.0015, 3)
-        peak = 2.2 * mean_speed * math.exp(rng.normal(0.0, 0.75))
-        stroke = max(0.25, 1.875 * float(np.linalg.norm(step)) / peak)
+        peak = 2.6 * mean_speed * math.exp(rng.normal(0.0, 0.75))
+        stroke = max(0.6, 1.875 * float(np.linalg.norm(step)) / peak)
         strokes.append((clock, stroke, step))
         here = here + step
         clock += stroke * rng.uniform(0.75, 1.0) + rng.exponential(0.35)

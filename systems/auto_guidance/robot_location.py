@@ -8,6 +8,7 @@ from pydrake.systems.framework import ValueProducer
 
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
+from plants.instruments.instrument import InstrumentParams
 from systems.common.block import Block
 
 
@@ -24,9 +25,10 @@ class RobotLocation(Block):
     Port ``robot_tool`` emits p_WG and the measured tip p_WP (6), in W [m].
     """
 
-    def __init__(self) -> None:
+    def __init__(self, instrument: InstrumentParams | None = None) -> None:
+        """Makes the block for an arm that carries an instrument."""
         super().__init__()
-        self._plant = make_controller_plant()
+        self._plant = make_controller_plant(instrument=instrument)
         self._tip = self._plant.GetFrameByName(INSTRUMENT_TIP)
         self._state = self.vector_in("arm_state", [*READY_POSTURE, *[0.0] * 7])
         self._fulcrum = self.vector_in("fulcrum", [0.0, 0.0, 0.0])

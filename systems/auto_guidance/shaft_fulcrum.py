@@ -14,6 +14,7 @@ several times better than it is measured.
 import math
 
 from systems.auto_guidance.optical_tracker import MarkerBody
+from systems.common.geometry import any_perpendicular, cross
 
 Point = tuple[float, float, float]
 PointCovariance = tuple[float, float, float, float, float, float]
@@ -21,18 +22,6 @@ PointCovariance = tuple[float, float, float, float, float, float]
 
 _QUIET = 4e-3  # rad, that the shaft may turn before its reference direction follows
 _NEAREST = 0.05  # m, from the markers' mean: a nearer fulcrum gives no direction
-
-
-def across(u: Point) -> tuple[Point, Point]:
-    """Two unit vectors that are perpendicular to the unit vector u and each other."""
-    ux, uy, uz = u
-    if abs(ux) < 0.7:  # e = u x X
-        n = math.sqrt(uy * uy + uz * uz)
-        ex, ey, ez = 0.0, uz / n, -uy / n
-    else:  # e = u x Z
-        n = math.sqrt(ux * ux + uy * uy)
-        ex, ey, ez = uy / n, -ux / n, 0.0
-    return (ex, ey, ez), (uy * ez - uz * ey, uz * ex - ux * ez, ux * ey - uy * ex)
 
 
 def lateral_variance(P: PointCovariance, u: Point) -> float:
@@ -114,7 +103,8 @@ def measure_line(
     t = (p[0] - cx) * rx + (p[1] - cy) * ry + (p[2] - cz) * rz
     t /= ux * rx + uy * ry + uz * rz
     cx, cy, cz = cx + t * ux, cy + t * uy, cz + t * uz
-    e, f = across(reference)
+    e = any_perpendicular(reference)
+    f = cross(reference, e)
     q, Q = measure(p, P, e, e[0] * cx + e[1] * cy + e[2] * cz, variance)
     return measure(q, Q, f, f[0] * cx + f[1] * cy + f[2] * cz, variance)
 
@@ -180,12 +170,12 @@ class ShaftFulcrum:
         g: Point = (x[0], x[1], x[2])
         P: PointCovariance = (x[3], x[4], x[5], x[6], x[7], x[8])
         r: Point = (x[9], x[10], x[11])
-        if self._given is None:
-            if dt is None:
-                (g, P), r = self._beforehand(c, u), u
-            else:
-                q = self._drift2 * dt
-                P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
+        first = self._given is None and dt is None
+        if first:
+            (g, P), r = self._beforehand(c, u), u
+        elif self._given is None and dt is not None:
+            q = self._drift2 * dt
+            P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
         dx, dy, dz = g[0] - cx, g[1] - cy, g[2] - cz
         d2 = dx * dx + dy * dy + dz * dz
         along = dx * ux + dy * uy + dz * uz
@@ -196,7 +186,7 @@ class ShaftFulcrum:
         if d2 - along * along > self._gate2 * (var_line + var_g):
             if self._given is None:  # another fulcrum: begin again
                 (g, P), r = self._beforehand(c, u), u
-        elif along > _NEAREST:
+        elif along > _NEAREST and not first:
             distance = math.sqrt(d2)
             dx, dy, dz = dx / distance, dy / distance, dz / distance
             weight = d2 * self.var_u / (var_line + var_g)

@@ -90,7 +90,7 @@ def tip_motion(params: SurgeonToolParams) -> Motion:
     """
     params.check()
     times, points = params.times, params.points
-    if params.recording is None:
+    if not params.recording:
         base = waypoint_motion(times, points)
         key_times = list(times)
     else:

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 Motion = Callable[[float], tuple[float, float, float, float, float, float]]
 """Time in s to position in m (x, y, z) and velocity in m/s (x, y, z)."""
 
-_TREMOR_WAVES = 3  # sinusoids for each axis
+_TREMOR_WAVES = 3  # sinusoids; each axis has its own phases
 
 
 @dataclass
@@ -149,15 +149,23 @@ def tremor_motion(rms: float, seed: int) -> Motion:
         seed: Same seed, same phases and frequencies.
     """
     rng = np.random.default_rng(seed)
-    rates = (2.0 * math.pi * rng.uniform(8.0, 12.0, (3, _TREMOR_WAVES))).tolist()
-    phases = rng.uniform(0.0, 2.0 * math.pi, (3, _TREMOR_WAVES)).tolist()
-    axes = [list(zip(w, p, strict=True)) for w, p in zip(rates, phases, strict=True)]
+    rates = 2.0 * math.pi * rng.uniform(8.0, 12.0, (_TREMOR_WAVES, 1))
+    phases = rng.uniform(0.0, 2.0 * math.pi, (_TREMOR_WAVES, 3))
+    waves = np.hstack([rates, phases]).tolist()
     amplitude = rms * math.sqrt(2.0 / (3.0 * _TREMOR_WAVES))
     sin, cos = math.sin, math.cos
 
     def motion(t: float) -> tuple[float, float, float, float, float, float]:
-        x, y, z = (amplitude * sum([sin(w * t + p) for w, p in a]) for a in axes)
-        u, v, w = (amplitude * sum([c * cos(c * t + p) for c, p in a]) for a in axes)
+        x = y = z = u = v = w = 0.0
+        for rate, a, b, c in waves:
+            k, turn = amplitude * rate, rate * t
+            a, b, c = a + turn, b + turn, c + turn
+            x += amplitude * sin(a)
+            y += amplitude * sin(b)
+            z += amplitude * sin(c)
+            u += k * cos(a)
+            v += k * cos(b)
+            w += k * cos(c)
         return x, y, z, u, v, w
 
     return motion

@@ -16,8 +16,12 @@ import math
 from typing import Any
 
 from systems.common.block import Block
+from systems.common.geometry import Vector
 
 MOVING = 0
+WAITING = 7
+NEVER_SEEN = 1.0
+"""An estimate's standard deviation before the tool was ever seen [m]."""
 REASONS = {
     1: "target lost by the tracker",
     2: "obstacle lost by the tracker",
@@ -25,10 +29,9 @@ REASONS = {
     4: "target out of reach",
     5: "target outside the view cone",
     6: "arm does not follow",
+    7: "waiting for the tracker's first frame",
 }
 """Why the robot stands: the code on port ``stop`` and its text."""
-
-Vector = tuple[float, float, float]
 
 
 @dataclass
@@ -50,7 +53,7 @@ class ToolNavigationParams:
     """
 
     period: float = 1.0 / 60.0
-    tip_speed: float = 0.06
+    tip_speed: float = 0.1
     turning_speed: float = 1.0
     acceleration: float = 1.0
     min_insertion: float = 0.03
@@ -88,7 +91,9 @@ def unit(x: float, y: float, z: float) -> tuple[Vector, float]:
     return (x / length, y / length, z / length), length
 
 
-def reachable(params: ToolNavigationParams, p_WG: Vector, p_WP: Vector) -> bool:
+def reachable(
+    params: ToolNavigationParams, p_WG: Sequence[float], p_WP: Sequence[float]
+) -> bool:
     """Whether the tool through fulcrum p_WG can have its tip at p_WP (both in W)."""
     u, length = unit(p_WP[0] - p_WG[0], p_WP[1] - p_WG[1], p_WP[2] - p_WG[2])
     return params.min_insertion <= length <= params.max_insertion and -u[2] >= math.cos(
@@ -96,7 +101,7 @@ def reachable(params: ToolNavigationParams, p_WG: Vector, p_WP: Vector) -> bool:
     )
 
 
-def cone_angle(view_cone: Sequence[float], p_WP: Vector) -> float:
+def cone_angle(view_cone: Sequence[float], p_WP: Sequence[float]) -> float:
     """Angle [rad] of a point to the axis of a view cone (apex, axis, half angle)."""
     a, _ = unit(p_WP[0] - view_cone[0], p_WP[1] - view_cone[1], p_WP[2] - view_cone[2])
     cosine = a[0] * view_cone[3] + a[1] * view_cone[4] + a[2] * view_cone[5]
@@ -269,6 +274,8 @@ class ToolNavigation(Block):
         p: Vector,
     ) -> int:
         """Why the tool must stop, or MOVING."""
+        if target[12] >= NEVER_SEEN or obstacle[12] >= NEVER_SEEN:
+            return WAITING
         if target[15] < 0.5:
             return 1
         if obstacle[15] < 0.5:

@@ -146,7 +146,7 @@ class TipFilter:
         """
         px, py, pz, ux, uy, uz, frame, valid = m
         last = x[27]
-        if valid < 0.5 or not last < frame < math.inf:
+        if not valid >= 0.5 or not last < frame < math.inf:
             return x
         length = math.sqrt(ux * ux + uy * uy + uz * uz)
         if not 0.9 < length < 1.1 or not math.isfinite(px + py + pz):
@@ -254,7 +254,7 @@ class TrajectoryEstimator(Block):
         measurement = self._measurement.Eval(context).tolist()
         value.set_value(self._filter.absorb(state, measurement))
 
-    def _state_after(self, context: Any) -> Sequence[float]:
+    def _state_after(self, context: Any) -> list[float]:
         state: list[float] = self._absorbed.Eval(context)
         return state
 

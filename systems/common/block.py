@@ -56,6 +56,22 @@ class Block(LeafSystem):
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
 
+    def state_out(self, name: str, initial: Sequence[float] | np.ndarray) -> Any:
+        """Declares a group of discrete state that is an output port as well.
+
+        Cheaper than a computed output, and never feedthrough.
+
+        Args:
+            name: The port's name.
+            initial: The state's initial value; its length is the port's size.
+
+        Returns:
+            The group's index.
+        """
+        group = self.DeclareDiscreteState(np.array(initial, float))
+        self.DeclareStateOutputPort(name, group)
+        return group
+
     def cached(
         self, name: str, calc: Callable[[Any], Any], prerequisites: set[Any]
     ) -> Any:
@@ -79,26 +95,33 @@ class Block(LeafSystem):
         return self.DeclareCacheEntry(name, producer, prerequisites)
 
     def update_every(
-        self, period: float, update: Callable[[Any], Sequence[float]]
+        self, period: float, update: Callable[[Any], Sequence[Any]]
     ) -> None:
-        """Declares `update(context)` as the next value of discrete state 0.
+        """Declares `update(context)` as the next value of the discrete state.
 
         The update is timed by the stopwatch; it must read nothing but the
-        context.
+        context. Call this after the state has been declared.
 
         Args:
             period: In seconds, > 0; the first update is at time zero.
-            update: Returns the new state vector.
+            update: Returns the new state vector; with several groups of discrete
+                state, one vector for each.
 
         Raises:
             ValueError: If the period is not positive.
         """
         if not period > 0.0:
             raise ValueError(f"{type(self).__name__}: period={period} s must be > 0")
+        groups = self.num_discrete_state_groups()
 
         def timed(context: Any, state: Any) -> None:
             with_time = STOPWATCH.begin()
-            state.set_value(np.asarray(update(context)))
+            value = update(context)
+            if groups == 1:
+                state.set_value(np.asarray(value))
+            else:
+                for group, vector in enumerate(value):
+                    state.set_value(group, np.asarray(vector))
             if with_time:
                 STOPWATCH.end(self.get_name(), context.get_time(), True)
 

@@ -10,28 +10,40 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem, PortDataType
 import pytest
 
+from diagrams.common.scenario import load_scenario
+from diagrams.common.study import get_study
 import plants
 import systems
 from systems.common.block import Block
 
 
-def all_blocks() -> list[type]:
-    """Every concrete LeafSystem defined in `systems` and `plants`."""
+def all_blocks(package) -> list[type]:
+    """Every concrete LeafSystem defined in a package."""
     found = []
-    for package in (systems, plants):
-        for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            module = importlib.import_module(info.name)
-            for _, kind in inspect.getmembers(module, inspect.isclass):
-                own = kind.__module__ == info.name
-                if own and issubclass(kind, LeafSystem) and kind is not Block:
-                    found.append(kind)
+    for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        module = importlib.import_module(info.name)
+        for _, kind in inspect.getmembers(module, inspect.isclass):
+            own = kind.__module__ == info.name
+            if own and issubclass(kind, LeafSystem) and kind is not Block:
+                found.append(kind)
     return sorted(found, key=lambda kind: kind.__name__)
 
 
-BLOCKS = all_blocks()
-# A block that reads a SceneGraph has no outputs without one: its diagram's tests
-# cover it.
-ALONE = [kind for kind in BLOCKS if not kind().HasInputPort("query_object")]
+BLOCKS = all_blocks(systems)
+DIAGRAMS = ["gauze_static"]
+"""One scenario of every kind of diagram."""
+# What observes a plant has no ports' values without it: tested in its diagram.
+OBSERVERS = all_blocks(plants)
+
+
+def assert_documented(dut: LeafSystem) -> None:
+    """Every port has a name that stands in the class's docstring."""
+    text = inspect.getdoc(type(dut))
+    ports = [dut.get_input_port(i) for i in range(dut.num_input_ports())]
+    ports += [dut.get_output_port(i) for i in range(dut.num_output_ports())]
+    assert ports
+    for port in ports:
+        assert f"``{port.get_name()}``" in text
 
 
 def fixed_context(dut: LeafSystem):
@@ -75,23 +87,38 @@ def test_there_are_blocks():
 
 @pytest.mark.parametrize("kind", BLOCKS, ids=lambda kind: kind.__name__)
 def test_ports_are_named_and_documented(kind):
-    dut = kind()
-    text = inspect.getdoc(kind)
-    ports = [dut.get_input_port(i) for i in range(dut.num_input_ports())]
-    ports += [dut.get_output_port(i) for i in range(dut.num_output_ports())]
-    assert ports
-    for port in ports:
-        assert f"``{port.get_name()}``" in text
+    assert_documented(kind())
 
 
-@pytest.mark.parametrize("kind", ALONE, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("name", DIAGRAMS)
+def test_observers_in_their_diagram(name):
+    scenario = load_scenario(name)
+    diagram = get_study(scenario.system).make_diagram(scenario)
+    context = diagram.CreateDefaultContext()
+    for system in diagram.GetSystems():
+        if type(system) in OBSERVERS:
+            assert_documented(system)
+            values = outputs(system, system.GetMyContextFromRoot(context))
+            assert all(np.isfinite(value).all() for value in values)
+
+
+def test_every_observer_is_in_a_diagram():
+    seen = set()
+    for name in DIAGRAMS:
+        scenario = load_scenario(name)
+        diagram = get_study(scenario.system).make_diagram(scenario)
+        seen |= {type(system) for system in diagram.GetSystems()}
+    assert set(OBSERVERS) <= seen
+
+
+@pytest.mark.parametrize("kind", BLOCKS, ids=lambda kind: kind.__name__)
 def test_outputs_are_finite_and_repeatable(kind):
     first, second = trajectory(kind()), trajectory(kind())
     assert np.isfinite(first).all()
     np.testing.assert_array_equal(first, second)
 
 
-@pytest.mark.parametrize("kind", ALONE, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", BLOCKS, ids=lambda kind: kind.__name__)
 def test_no_state_hides_outside_the_context(kind):
     dut = kind()
     fresh = trajectory(dut)
