@@ -12,7 +12,7 @@ O stops.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp
+from math import exp, isfinite
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,6 @@ from systems.auto_guidance.signals import (
 from systems.common.block import Block
 from systems.common.geometry import (
     Vector,
-    all_finite,
     along,
     shaft_point_velocity,
     sub,
@@ -96,7 +95,7 @@ def backward_movement(
         v_3 after the step, m/s.
     """
     v_o: Vector = (0.0, 0.0, 0.0)
-    if usable(obstacle) and all_finite(guide):
+    if usable(obstacle) and isfinite(sum(guide)):
         v_o = contact_velocity(guide, obstacle)
     if params.form == "printed":
         return along(v3, params.gain * dt, v_o)

@@ -49,7 +49,6 @@ from systems.common.geometry import (
     limited,
     norm,
     sub,
-    unit,
 )
 
 TABLE_I = [
@@ -170,12 +169,17 @@ def axes(guide: Sequence[float]) -> tuple[Vector, Vector]:
     """
     rx, ry, rz, ox, oy, oz, *_, fx, fy, fz = guide
     goal = (fx - rx, fy - ry, fz - rz)
-    y = unit((ox - rx, oy - ry, oz - rz), any_perpendicular(goal))
-    across = along(goal, -dot(goal, y), y)
-    size = norm(across)
+    y = (ox - rx, oy - ry, oz - rz)
+    size = norm(y)
+    if size < 1e-12:
+        y = any_perpendicular(goal)
+    else:
+        y = (y[0] / size, y[1] / size, y[2] / size)
+    x = along(goal, -dot(goal, y), y)
+    size = norm(x)
     if size < 1e-6:
         return any_perpendicular(y), y
-    return (across[0] / size, across[1] / size, across[2] / size), y
+    return (x[0] / size, x[1] / size, x[2] / size), y
 
 
 class Decision:

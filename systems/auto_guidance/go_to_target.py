@@ -30,7 +30,7 @@ the robot away from its goal rather than from the obstacle, and orbits.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, hypot
+from math import exp, hypot, isfinite
 from typing import Any
 
 import numpy as np
@@ -167,8 +167,11 @@ def potential_distance(rho: float, params: GoToTargetParams) -> float:
 
 def away_from_obstacle(guide: Sequence[float], u: Sequence[float]) -> Vector:
     """Unit vector n_o from M_O to M_R; across R's shaft `u` where they touch."""
-    d = (guide[0] - guide[3], guide[1] - guide[4], guide[2] - guide[5])
-    return unit(d, any_perpendicular(u))
+    dx, dy, dz = guide[0] - guide[3], guide[1] - guide[4], guide[2] - guide[5]
+    rho = hypot(dx, dy, dz)
+    if rho < 1e-12:
+        return any_perpendicular(u)
+    return dx / rho, dy / rho, dz / rho
 
 
 def corrected_force(
@@ -269,17 +272,12 @@ def go_to_target(
         estimate of both tools the velocity runs down to zero; without a finite
         one the guide point is the tip, and the distance to O is given as 0.
     """
-    stop = (0.0, 0.0, 0.0)
-    if not all_finite(robot_tool):
-        guide = [0.0] * 7 + [1.0, 1.0] + [0.0] * 3
-        return approach(v_tip, stop, params, dt), guide
+    known = usable(obstacle) and usable(target) and isfinite(sum(robot_tool))
+    if not known:
+        guide = _guide_without_estimates(params, robot_tool, obstacle, target)
+        return approach(v_tip, (0.0, 0.0, 0.0), params, dt), guide
     p = robot_tool[3:6]
-    if not all_finite(obstacle[0:3], fulcrum(obstacle), target[0:3]):
-        guide = [*p, *p, 0.0, 1.0, 1.0, *p]
-        return approach(v_tip, stop, params, dt), guide
     guide = guide_point(robot_tool, obstacle, target, params.proportion_floor)
-    if not (usable(obstacle) and usable(target)):
-        return approach(v_tip, stop, params, dt), guide
     u = unit(sub(p, robot_tool[0:3]), (0.0, 0.0, -1.0))
     if params.form == "printed":
         force = printed_force(params, guide, u)
@@ -288,6 +286,21 @@ def go_to_target(
     balance = along(velocity(target), 1.0 / params.damping, force)
     goal_velocity = limited(balance, params.max_speed)
     return approach(v_tip, goal_velocity, params, dt), guide
+
+
+def _guide_without_estimates(
+    params: GoToTargetParams,
+    robot_tool: Sequence[float],
+    obstacle: Sequence[float],
+    target: Sequence[float],
+) -> list[float]:
+    """The guide signal from what is finite, for estimates that are not usable."""
+    if not all_finite(robot_tool):
+        return [0.0] * 7 + [1.0, 1.0] + [0.0] * 3
+    if all_finite(obstacle[0:3], fulcrum(obstacle), target[0:3]):
+        return guide_point(robot_tool, obstacle, target, params.proportion_floor)
+    p = robot_tool[3:6]
+    return [*p, *p, 0.0, 1.0, 1.0, *p]
 
 
 def approach(

@@ -8,8 +8,7 @@ World frame, SI units.
 """
 
 from collections.abc import Sequence
-
-from systems.common.geometry import all_finite
+from math import isfinite
 
 ROBOT_TOOL_EXAMPLE = [0.0, 0.0, 0.0, 0.02, 0.0, -0.12]
 """A robot's instrument, 0.12 m inside."""
@@ -57,5 +56,6 @@ def fulcrum(estimate: Sequence[float]) -> Sequence[float]:
 
 
 def usable(estimate: Sequence[float]) -> bool:
-    """True if the estimator knows the tool and gives numbers for its motion."""
-    return estimate[15] > 0.5 and all_finite(estimate[0:12])
+    """True if the estimator knows the tool and gives numbers only."""
+    # A sum with a NaN or an infinity in it is never finite.
+    return estimate[15] > 0.5 and isfinite(sum(estimate))

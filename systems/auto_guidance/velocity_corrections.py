@@ -17,7 +17,7 @@ field's task (the paper's static case).
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import exp, sqrt
+from math import exp, isfinite, sqrt
 from typing import Any
 
 from systems.auto_guidance.signals import (
@@ -30,7 +30,7 @@ from systems.auto_guidance.signals import (
 )
 from systems.common.block import Block
 from systems.common.fuzzy import Partition, RuleTable
-from systems.common.geometry import Vector, all_finite, along, cross, dot, norm, sub
+from systems.common.geometry import Vector, along, cross, dot, norm, sub
 
 DISTANCES = ["Z", "AZ", "M", "F", "VF"]
 TIMES = ["Z", "AZ", "M", "L", "VL"]
@@ -223,7 +223,7 @@ def velocity_correction(
         guide: The guide signal (12).
         obstacle: Estimate (17) of O.
     """
-    if not (usable(obstacle) and all_finite(v1, guide)):
+    if not (usable(obstacle) and isfinite(sum(v1) + sum(guide))):
         return 0.0, 0.0, 0.0
     distance, time, degree = crossing(guide, v1, obstacle, params)
     if degree <= 0.0:

@@ -1,16 +1,14 @@
 """Speed of the snake: its kinematics, and its plant beside MuJoCo's.
 
-    python -m tests.benchmarks.snake_speed
-
 MuJoCo is optional (`pip install trocar[peers]`). Both engines carry the same bodies
 through `snake_circle`, each at the largest of the listed steps at which it stays
 within 1 mm (rms) of the reference. Best of several runs; wall time, one thread.
 MuJoCo is untuned: no armature, default solver; the couplers' softness is tried.
 """
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
+import importlib.util
 from time import perf_counter
 from typing import Any
 
@@ -290,11 +288,7 @@ def plants() -> list[tuple[str, Result]]:
         )
     )
     rows.append(("Drake CENIC, drums", largest_step([lambda h: drake(path, h)])))
-    try:
-        import mujoco  # noqa: F401
-    except ImportError:
-        print("MuJoCo is not installed: pip install trocar[peers]\n")
-    else:
+    if importlib.util.find_spec("mujoco") is not None:
         for name, tendons in (("servos", False), ("spatial tendons", True)):
             runs = [
                 lambda h, t=tendons, s=softness: mujoco_snake(path, h, t, s)
@@ -318,20 +312,22 @@ def plants() -> list[tuple[str, Result]]:
     return rows
 
 
-def main(seed: int = 1) -> None:
-    """Prints both tables."""
-    print(f"{'kinematics':<28}{'measured':>14}{'target':>14}")
+def report(seed: int = 1, scenes: int = 0) -> str:
+    """Both tables as text; `scenes` is for other benchmarks."""
+    del scenes
+    lines = [f"{'kinematics':<28}{'measured':>14}{'target':>14}"]
     for name, figure, target, unit in kinematics(seed):
-        print(f"{name:<28}{figure:>14,.0f}{target:>14,.0f} {unit}")
-    print(f"\n{'plant':<52}{'step':>8}{'RTF':>7}{'tip rms':>10}{'coupler':>10}")
+        lines.append(f"{name:<28}{figure:>14,.0f}{target:>14,.0f} {unit}")
+    lines += ["", f"{'plant':<52}{'step':>8}{'RTF':>7}{'tip rms':>10}{'coupler':>10}"]
     for name, r in plants():
-        print(
+        lines.append(
             f"{name:<52}{1e3 * r.step:>5.1f} ms{r.real_time_factor:>7.1f}"
             f"{1e3 * r.tip_error:>7.3f} mm{r.coupler_error:>10.1e}"
         )
+    if importlib.util.find_spec("mujoco") is None:
+        lines += ["", "MuJoCo is not installed: pip install 'trocar[peers]'"]
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=1)
-    main(parser.parse_args().seed)
+    print(report())
