@@ -229,8 +229,9 @@ def checked_bends(L: ArrayLike, params: SnakeParams, tolerance: float = 1e-6) ->
         worst = float(np.abs(nearest - L)[own].max())
         if not worst <= tolerance:
             raise ValueError(
-                f"module {m + 1}: no posture has its wire lengths {1e3 * L[own]} mm, "
-                f"they disagree by {1e3 * worst:.3f} mm; nearest "
-                f"{1e3 * nearest[own]} mm"
+                f"module {m + 1}: no posture has its wire lengths "
+                f"{np.round(1e3 * L[own], 3).tolist()} mm, they disagree by "
+                f"{1e3 * worst:.3f} mm; nearest "
+                f"{np.round(1e3 * nearest[own], 3).tolist()} mm"
             )
     return bends

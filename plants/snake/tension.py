@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from plants.snake.actuation import norm_rows
-from plants.snake.kinematics import Array
+from plants.snake.jacobian import universal_jacobian
+from plants.snake.kinematics import Array, postures
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
 
 
@@ -82,6 +83,24 @@ def length_jacobian(ab: ArrayLike, params: SnakeParams) -> Array:
         length_gradients(ab[2 * m], ab[2 * m + 1], rows[WIRES * m :], R, h, e, block)
         J[WIRES * m :, 2 * m : 2 * m + 2] = block
     return J
+
+
+def torques_against(
+    q: ArrayLike, f_T_W: ArrayLike, params: SnakeParams, m_T_W: ArrayLike = (0, 0, 0)
+) -> Array:
+    """Torques on (a1, b1, ..., b3) that hold the tool against a load.
+
+    Args:
+        q: Posture, (7,).
+        f_T_W: Force on the tool at its origin, in N, (3,).
+        params: The snake.
+        m_T_W: Moment on the tool, in Nm, (3,).
+
+    Returns:
+        tau in Nm, (6,), to be given to `tensions`.
+    """
+    load = np.concatenate([np.asarray(m_T_W, float), np.asarray(f_T_W, float)])
+    return -universal_jacobian(postures(q), params)[:, 1:].T @ load
 
 
 def tensions(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from plants.snake.actuation import wire_lengths
-from plants.snake.kinematics import from_universal
+from plants.snake.kinematics import forward, from_universal
 from plants.snake.parameters import SnakeParams
-from plants.snake.tension import length_jacobian, tensions
+from plants.snake.tension import length_jacobian, tensions, torques_against
 
 PARAMS = SnakeParams().check()
 
@@ -56,6 +56,34 @@ def test_unloaded_and_fully_bent_takes_a_few_newtons():
         T = tensions([a, b] * 3, np.zeros(6), PARAMS)
         worst = max(worst, T.max())
     assert worst == pytest.approx(4.71, abs=0.02)
+
+
+def test_tensions_hold_a_load_at_the_tip():
+    """By moments for a newton across the straight robot's tip, and virtual work.
+
+    A module's balls bend alike, so wires balance the mean of their two moments.
+    """
+    params = SnakeParams(tool_offset=6e-3)
+    tau = torques_against(np.zeros(7), [1.0, 0.0, 0.0], params)
+    T = tensions(np.zeros(6), tau, params, least=1.0)
+    across = -T @ np.cos(np.ravel(params.azimuths()))
+    lever = 12 * params.half_pitch + params.tool_offset  # from the first ball
+    mean = lever - params.half_pitch
+    assert params.ball_radius * across == pytest.approx(mean, rel=1e-9)
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        ab, force = random_angles(rng), rng.normal(size=3)
+        alpha, beta = from_universal(ab[::2], ab[1::2])
+        q = np.array([0.0, *np.stack([alpha, beta], 1).ravel()])
+        T = tensions(ab, torques_against(q, force, PARAMS), PARAMS)
+        d = 1e-6 * rng.normal(size=6)
+        ends = [from_universal((ab + s * d)[::2], (ab + s * d)[1::2]) for s in (-1, 1)]
+        tips = [
+            forward([0.0, *np.stack(end, 1).ravel()], PARAMS)[:3, 3] for end in ends
+        ]
+        work = force @ (tips[1] - tips[0])
+        wound = T @ (lengths(ab + d) - lengths(ab - d))
+        assert work == pytest.approx(wound, abs=1e-9)
 
 
 def test_all_wires_can_be_taut_only_under_the_inequality():
