@@ -10,7 +10,7 @@ class SnakeDriveParams:
     With drums the wires are as stiff as their drums hold them: a spring on each
     of a module's two angles, implicit in the integrator. The default equals
     steel wires of 2e4 N/m (0.3 mm, some 350 mm long) seen from a module,
-    `wire_stiffness` times the squared length gradient, 3/2 (4 R)^2 / 4.
+    `wire_stiffness` times 3/2 (2 R)^2.
 
     Attributes:
         kp: Stiffness of a and b of each module in Nm/rad.

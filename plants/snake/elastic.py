@@ -13,7 +13,7 @@ from plants.snake.parameters import MODULES, WIRES, SnakeParams
 from plants.snake.tension import length_gradients
 
 
-@njit(cache=True)
+@njit  # not cached: numba would not notice changes in the files it calls into
 def _pull(
     ab: Any,
     ab_rate: Any,

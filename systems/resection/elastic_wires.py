@@ -96,6 +96,10 @@ class ElasticWires(Block):
         self._snake = (snake or SnakeParams()).check()
         self._drive = (drive or SnakeDriveParams()).check()
         straight = wire_lengths(np.zeros(7), self._snake)
+        # Compiles now, so that no run pays for it.
+        elastic_pull(
+            np.zeros(6), np.zeros(6), straight, np.zeros(9), self._snake, self._drive
+        )
         self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
         self._lengths = self.vector_in("lengths", [*(straight - 2e-4), 0.0])
         self._rates = self.vector_in("rates", [0.0] * AXES)
