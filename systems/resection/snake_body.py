@@ -1,0 +1,258 @@
+"""The snake's body as balls, and driving it from one posture to another.
+
+Postures are in the non-singular coordinates x = (s, a1, b1, a2, b2, a3, b3) of
+`plants.snake.kinematics`, in which a straight line between two postures keeps the
+bend's limit, a cone that is convex there.
+
+The body is balls of its radius along the axis, points on the last plate's rims, and
+the thin shank of the tool. Balls touch where the axis is straight, so the body
+between them stands out of them by less than 0.1 mm.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plants.snake.parameters import SnakeParams
+from systems.common.compiled import compiled
+from systems.resection.space import (
+    FREE,
+    body_solid,
+    first_forbidden,
+    first_solid,
+    point_solid,
+    roll_back,
+    stamp,
+)
+
+OK = 0
+BODY = 1  # some part of the body meets tissue
+TOOL = 2  # the tool would leave what it may remove
+BEND = 3  # a bend beyond its limit
+TRAVEL = 4  # the translation beyond its travel
+
+SHANK = 1.2e-3
+"""Radius of the tool's shank in m."""
+
+RIM = 12
+"""Points on each rim of the last plate."""
+
+
+class Body(NamedTuple):
+    """The robot's numbers for compiled functions. SI units.
+
+    Attributes:
+        h: Half the distance between ball centres.
+        tool: Distance from O3 to the tool.
+        radius: Of the tool's ball.
+        body: Radius of the body, clearance included.
+        face: Distance from the last ball's centre to the last plate's outer face.
+        bend: Largest beta.
+        low: Least translation.
+        high: Largest translation.
+        step: Longest stretch of the body's motion between two checks.
+    """
+
+    h: float
+    tool: float
+    radius: float
+    body: float
+    face: float
+    bend: float
+    low: float
+    high: float
+    step: float
+
+
+def body_of(params: SnakeParams, clearance: float = 0.0, step: float = 1.0e-3) -> Body:
+    """The robot's numbers, its body grown by a clearance in m."""
+    return Body(
+        params.half_pitch,
+        params.tool_offset,
+        params.tool_radius,
+        params.body_radius + clearance,
+        params.half_pitch + params.plate_thickness / 2,
+        params.max_bend,
+        params.travel[0],
+        params.travel[1],
+        step,
+    )
+
+
+@compiled
+def corners(x: Any, h: float, tool: float, out: Any) -> None:
+    """Six ball centres, O3 and the tool of a posture (7,), into out (8, 3)."""
+    p0, p1, p2 = 0.0, 0.0, x[0]
+    # Columns of the rotation: e across x, f across y, n along the robot.
+    e0, e1, e2 = 1.0, 0.0, 0.0
+    f0, f1, f2 = 0.0, 1.0, 0.0
+    n0, n1, n2 = 0.0, 0.0, 1.0
+    for k in range(3):
+        ca, sa = math.cos(x[1 + 2 * k]), math.sin(x[1 + 2 * k])
+        cb, sb = math.cos(x[2 + 2 * k]), math.sin(x[2 + 2 * k])
+        for half in range(2):
+            out[2 * k + half, 0] = p0
+            out[2 * k + half, 1] = p1
+            out[2 * k + half, 2] = p2
+            if half == 0:  # Rx(a) Ry(b)
+                f0, n0 = ca * f0 + sa * n0, ca * n0 - sa * f0
+                f1, n1 = ca * f1 + sa * n1, ca * n1 - sa * f1
+                f2, n2 = ca * f2 + sa * n2, ca * n2 - sa * f2
+                e0, n0 = cb * e0 - sb * n0, cb * n0 + sb * e0
+                e1, n1 = cb * e1 - sb * n1, cb * n1 + sb * e1
+                e2, n2 = cb * e2 - sb * n2, cb * n2 + sb * e2
+            else:  # Ry(b) Rx(a)
+                e0, n0 = cb * e0 - sb * n0, cb * n0 + sb * e0
+                e1, n1 = cb * e1 - sb * n1, cb * n1 + sb * e1
+                e2, n2 = cb * e2 - sb * n2, cb * n2 + sb * e2
+                f0, n0 = ca * f0 + sa * n0, ca * n0 - sa * f0
+                f1, n1 = ca * f1 + sa * n1, ca * n1 - sa * f1
+                f2, n2 = ca * f2 + sa * n2, ca * n2 - sa * f2
+            p0, p1, p2 = p0 + 2 * h * n0, p1 + 2 * h * n1, p2 + 2 * h * n2
+    out[6, 0], out[6, 1], out[6, 2] = p0, p1, p2
+    out[7, 0], out[7, 1], out[7, 2] = p0 + tool * n0, p1 + tool * n1, p2 + tool * n2
+
+
+@compiled
+def _blame(why: Any, part: int, x: float, y: float, z: float, rho: float, at: int) -> int:
+    why[0], why[1], why[2], why[3] = part, x, y, z
+    why[4], why[5] = rho, at
+    return BODY
+
+
+@compiled
+def check_body(s: Any, b: Any, c: Any, last_only: bool, why: Any) -> int:
+    """OK or BODY for a body with corners c (8, 3); the culprit goes to why (6,).
+
+    Parts 0 to 5 are the links behind each ball (0 what lies in the channel), 6 the
+    last plate's rim, 7 the shank.
+    """
+    if not last_only:
+        z = c[0, 2] - b.h / 2
+        while z > -b.body:
+            at = body_solid(s, 0.0, 0.0, z, b.body)
+            if at != FREE:
+                return _blame(why, 0, 0.0, 0.0, z, b.body, at)
+            z -= b.h / 2
+    for link in range(4 if last_only else 0, 5):
+        for n in range(4):
+            t = n / 4
+            x = c[link, 0] + t * (c[link + 1, 0] - c[link, 0])
+            y = c[link, 1] + t * (c[link + 1, 1] - c[link, 1])
+            z = c[link, 2] + t * (c[link + 1, 2] - c[link, 2])
+            at = body_solid(s, x, y, z, b.body)
+            if at != FREE:
+                return _blame(why, link, x, y, z, b.body, at)
+    x, y, z = c[5, 0], c[5, 1], c[5, 2]
+    at = body_solid(s, x, y, z, b.body)
+    if at != FREE:
+        return _blame(why, 5, x, y, z, b.body, at)
+    length = 2 * b.h + b.tool
+    n0, n1, n2 = (c[7, 0] - x) / length, (c[7, 1] - y) / length, (c[7, 2] - z) / length
+    # Two axes across the last link.
+    if abs(n0) < 0.7:
+        e0, e1, e2 = 0.0, n2, -n1
+    else:
+        e0, e1, e2 = -n2, 0.0, n0
+    size = math.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
+    e0, e1, e2 = e0 / size, e1 / size, e2 / size
+    f0, f1, f2 = n1 * e2 - n2 * e1, n2 * e0 - n0 * e2, n0 * e1 - n1 * e0
+    for ring in range(3):
+        along = b.face / 2 if ring == 0 else b.face
+        r = 0.7 * b.body if ring == 2 else b.body
+        for m in range(RIM):
+            turn = 2 * math.pi * m / RIM
+            u, v = r * math.cos(turn), r * math.sin(turn)
+            px = x + along * n0 + u * e0 + v * f0
+            py = y + along * n1 + u * e1 + v * f1
+            pz = z + along * n2 + u * e2 + v * f2
+            at = point_solid(s, px, py, pz)
+            if at != FREE:
+                return _blame(why, 6, px, py, pz, 0.0, at)
+    along = b.face
+    while along < length - b.radius + SHANK:
+        px, py, pz = x + along * n0, y + along * n1, z + along * n2
+        at = first_solid(s, px, py, pz, SHANK)
+        if at != FREE:
+            return _blame(why, 7, px, py, pz, SHANK, at)
+        along += SHANK
+    return OK
+
+
+@compiled
+def check_limits(b: Any, x: Any) -> int:
+    """OK, BEND or TRAVEL."""
+    if x[0] < b.low - 1e-9 or x[0] > b.high + 1e-9:
+        return TRAVEL
+    least = math.cos(b.bend) - 1e-9
+    for k in range(3):
+        if math.cos(x[1 + 2 * k]) * math.cos(x[2 + 2 * k]) < least:
+            return BEND
+    return OK
+
+
+@compiled
+def drive(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> int:
+    """Moves from a posture that fits to another, freeing what the tool sweeps.
+
+    Every step of the straight line is checked, body first, then tool: the body may
+    use what the tool has freed ahead of it. If a step fails, nothing has happened.
+
+    Args:
+        s: The space.
+        b: The body.
+        x0: Posture (7,) at which the robot stands.
+        x1: Posture (7,) to reach.
+        time: Arrival time of what this motion frees.
+        why: Takes the culprit (6): part, point [m], radius [m], voxel.
+
+    Returns:
+        OK, BODY, TOOL, BEND or TRAVEL.
+    """
+    freed, roomed = s.used[0], s.used[1]
+    status, _ = drive_far(s, b, x0, x1, time, why)
+    if status != OK:
+        roll_back(s, freed, roomed)
+    return status
+
+
+@compiled
+def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
+    """As `drive`, but goes as far as it can and stops there.
+
+    Returns:
+        The status, and the share of the way that was gone.
+    """
+    status = check_limits(b, x1)
+    if status != OK:
+        return status, 0.0
+    c0, c1, x = np.empty((8, 3)), np.empty((8, 3)), np.empty(7)
+    corners(x0, b.h, b.tool, c0)
+    corners(x1, b.h, b.tool, c1)
+    longest = 0.0
+    for n in range(8):
+        d = 0.0
+        for r in range(3):
+            d += (c1[n, r] - c0[n, r]) ** 2
+        longest = max(longest, d)
+    steps = max(1, math.ceil(math.sqrt(longest) / b.step))
+    last_only = True
+    for r in range(5):
+        last_only = last_only and x0[r] == x1[r]
+    for n in range(1, steps + 1):
+        share = n / steps
+        for r in range(7):
+            x[r] = x1[r] if n == steps else x0[r] + share * (x1[r] - x0[r])
+        corners(x, b.h, b.tool, c0)
+        status = check_body(s, b, c0, last_only, why)
+        if status == OK:
+            at = first_forbidden(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius)
+            if at != FREE:
+                why[0], why[1], why[2], why[3] = 8, c0[7, 0], c0[7, 1], c0[7, 2]
+                why[4], why[5] = b.radius, at
+                status = TOOL
+        if status != OK:
+            return status, (n - 1) / steps
+        stamp(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius, time)
+    return OK, 1.0

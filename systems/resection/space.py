@@ -1,0 +1,267 @@
+"""Free space as compiled functions see it: balls against voxels.
+
+One integer a voxel, its arrival time, is the whole state: 0 where space is free
+from the start (the access channel), k where the k-th pose of the plan freed it,
+`SOLID` elsewhere. Space only ever grows, so what fitted once fits for ever:
+
+- a ball known to fit (`roomy`) need not be looked at again;
+- a path once driven stays free, so the way back is always open.
+
+A speculation (a candidate procedure) writes to the same arrays and is rolled back
+from its journal. Voxel (i, j, k) has its centre at origin + spacing (i, j, k).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from systems.common.compiled import compiled
+
+SOLID = 2**31 - 1
+"""Arrival time of tissue that nothing has removed."""
+
+FREE = -1
+OUTSIDE = -2
+"""Answers of `first_solid` beside a voxel's index: free, or beyond the grid."""
+
+NEIGHBOUR = 0.8661
+"""No point is farther, in voxels, from the nearest voxel's centre: sqrt(3)/2."""
+
+
+class Space(NamedTuple):
+    """The arrays; flat, C order over `size`.
+
+    Attributes:
+        tau: Arrival time of each voxel, int32.
+        allowed: 1 where the tool may be: tumour and channel, off what is critical.
+        inside: Distance from each allowed voxel to the nearest one that is not,
+            in voxels, float32.
+        roomy: 1 where a ball of the body's radius about any point of the voxel is
+            known to be free, uint8.
+        size: Voxels along x, y, z.
+        origin: Centre of voxel (0, 0, 0) in the channel frame W, in m.
+        spacing: Edge of a voxel in m.
+        channel: Radius of the access channel in m.
+        depth: Where the access robot's channel ends, in m along z.
+        freed: Journal of voxels freed, int32.
+        roomed: Journal of voxels found roomy, int32.
+        used: Entries of either journal, int64 (2).
+    """
+
+    tau: Any
+    allowed: Any
+    inside: Any
+    roomy: Any
+    size: tuple[int, int, int]
+    origin: tuple[float, float, float]
+    spacing: float
+    channel: float
+    depth: float
+    freed: Any
+    roomed: Any
+    used: Any
+
+
+@compiled
+def first_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
+    """The first voxel that a ball would meet: its flat index, FREE or OUTSIDE."""
+    if z + rho <= s.depth and x * x + y * y <= (s.channel - rho) ** 2:
+        return FREE
+    u = (x - s.origin[0]) / s.spacing
+    v = (y - s.origin[1]) / s.spacing
+    w = (z - s.origin[2]) / s.spacing
+    r = rho / s.spacing
+    nx, ny, nz = s.size
+    if not (
+        u - r >= -0.5
+        and v - r >= -0.5
+        and w - r >= -0.5
+        and u + r <= nx - 0.5
+        and v + r <= ny - 0.5
+        and w + r <= nz - 0.5
+    ):
+        return OUTSIDE
+    rr = r * r
+    for a in range(math.ceil(u - r), math.floor(u + r) + 1):
+        left = rr - (a - u) ** 2
+        if left < 0.0:
+            continue
+        across = math.sqrt(left)
+        for b in range(math.ceil(v - across), math.floor(v + across) + 1):
+            rest = left - (b - v) ** 2
+            if rest < 0.0:
+                continue
+            half = math.sqrt(rest)
+            row = (a * ny + b) * nz
+            for c in range(
+                row + math.ceil(w - half), row + math.floor(w + half) + 1
+            ):
+                if s.tau[c] == SOLID:
+                    return c
+    return FREE
+
+
+@compiled
+def voxel_of(s: Any, x: float, y: float, z: float) -> int:
+    """Flat index of the voxel that holds a point; OUTSIDE if none does."""
+    nx, ny, nz = s.size
+    i = math.floor((x - s.origin[0]) / s.spacing + 0.5)
+    j = math.floor((y - s.origin[1]) / s.spacing + 0.5)
+    k = math.floor((z - s.origin[2]) / s.spacing + 0.5)
+    if 0 <= i < nx and 0 <= j < ny and 0 <= k < nz:
+        return (i * ny + j) * nz + k
+    return OUTSIDE
+
+
+@compiled
+def body_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
+    """As `first_solid` for the body's radius, remembering where it fitted."""
+    at = voxel_of(s, x, y, z)
+    if at >= 0 and s.roomy[at]:
+        return FREE
+    found = first_solid(s, x, y, z, rho)
+    if found == FREE and at >= 0:
+        g = s.spacing
+        _, ny, nz = s.size
+        i, j, k = at // (ny * nz), at // nz % ny, at % nz
+        px, py, pz = s.origin[0] + g * i, s.origin[1] + g * j, s.origin[2] + g * k
+        if first_solid(s, px, py, pz, rho + NEIGHBOUR * g) == FREE:
+            s.roomy[at] = 1
+            s.roomed[s.used[1]] = at
+            s.used[1] += 1
+    return found
+
+
+@compiled
+def point_solid(s: Any, x: float, y: float, z: float) -> int:
+    """Whether a point lies in tissue: its voxel, FREE or OUTSIDE."""
+    if z <= s.depth and x * x + y * y <= s.channel * s.channel:
+        return FREE
+    at = voxel_of(s, x, y, z)
+    if at >= 0 and s.tau[at] != SOLID:
+        return FREE
+    return at
+
+
+@compiled
+def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
+    """The first voxel of a ball where the tool may not be, FREE or OUTSIDE."""
+    if z + rho <= s.depth and x * x + y * y <= (s.channel - rho) ** 2:
+        return FREE
+    u = (x - s.origin[0]) / s.spacing
+    v = (y - s.origin[1]) / s.spacing
+    w = (z - s.origin[2]) / s.spacing
+    r = rho / s.spacing
+    nx, ny, nz = s.size
+    at = voxel_of(s, x, y, z)
+    if at >= 0:
+        i, j, k = at // (ny * nz), at // nz % ny, at % nz
+        off = math.sqrt((u - i) ** 2 + (v - j) ** 2 + (w - k) ** 2)
+        if s.inside[at] - off > r:
+            return FREE
+    if not (
+        u - r >= -0.5
+        and v - r >= -0.5
+        and w - r >= -0.5
+        and u + r <= nx - 0.5
+        and v + r <= ny - 0.5
+        and w + r <= nz - 0.5
+    ):
+        return OUTSIDE
+    rr = r * r
+    for a in range(math.ceil(u - r), math.floor(u + r) + 1):
+        left = rr - (a - u) ** 2
+        if left < 0.0:
+            continue
+        across = math.sqrt(left)
+        for b in range(math.ceil(v - across), math.floor(v + across) + 1):
+            rest = left - (b - v) ** 2
+            if rest < 0.0:
+                continue
+            half = math.sqrt(rest)
+            row = (a * ny + b) * nz
+            for c in range(
+                row + math.ceil(w - half), row + math.floor(w + half) + 1
+            ):
+                if s.allowed[c] == 0:
+                    return c
+    return FREE
+
+
+@compiled
+def stamp(s: Any, x: float, y: float, z: float, rho: float, time: int) -> None:
+    """Frees what of a ball is still solid, at a time."""
+    u = (x - s.origin[0]) / s.spacing
+    v = (y - s.origin[1]) / s.spacing
+    w = (z - s.origin[2]) / s.spacing
+    r = rho / s.spacing
+    nx, ny, nz = s.size
+    rr = r * r
+    for a in range(max(math.ceil(u - r), 0), min(math.floor(u + r) + 1, nx)):
+        left = rr - (a - u) ** 2
+        if left < 0.0:
+            continue
+        across = math.sqrt(left)
+        for b in range(
+            max(math.ceil(v - across), 0), min(math.floor(v + across) + 1, ny)
+        ):
+            rest = left - (b - v) ** 2
+            if rest < 0.0:
+                continue
+            half = math.sqrt(rest)
+            row = (a * ny + b) * nz
+            low, high = max(math.ceil(w - half), 0), min(math.floor(w + half), nz - 1)
+            for c in range(row + low, row + high + 1):
+                if s.tau[c] == SOLID:
+                    s.tau[c] = time
+                    s.freed[s.used[0]] = c
+                    s.used[0] += 1
+
+
+@compiled
+def roll_back(s: Any, freed: int, roomed: int) -> None:
+    """Undoes all that the journals hold beyond these many entries."""
+    for n in range(freed, s.used[0]):
+        s.tau[s.freed[n]] = SOLID
+    for n in range(roomed, s.used[1]):
+        s.roomy[s.roomed[n]] = 0
+    s.used[0], s.used[1] = freed, roomed
+
+
+@compiled
+def nearest_in_ball(s: Any, which: int, x: float, y: float, z: float, rho: float) -> Any:
+    """The voxel in a ball's way that is nearest to its centre.
+
+    Args:
+        s: The space.
+        which: 0 for solid voxels, 1 for voxels the tool may not be in.
+        x: Centre in m.
+        y: Centre.
+        z: Centre.
+        rho: Radius in m.
+
+    Returns:
+        Its flat index, or OUTSIDE, and its distance from the centre in m.
+    """
+    best, found = math.inf, OUTSIDE
+    u = (x - s.origin[0]) / s.spacing
+    v = (y - s.origin[1]) / s.spacing
+    w = (z - s.origin[2]) / s.spacing
+    r = max(rho / s.spacing, 0.87)
+    nx, ny, nz = s.size
+    for a in range(max(math.ceil(u - r), 0), min(math.floor(u + r) + 1, nx)):
+        for b in range(max(math.ceil(v - r), 0), min(math.floor(v + r) + 1, ny)):
+            for c in range(max(math.ceil(w - r), 0), min(math.floor(w + r) + 1, nz)):
+                at = (a * ny + b) * nz + c
+                wrong = s.tau[at] == SOLID if which == 0 else s.allowed[at] == 0
+                if wrong:
+                    d = math.sqrt((a - u) ** 2 + (b - v) ** 2 + (c - w) ** 2)
+                    if d <= r and d < best:
+                        best, found = d, at
+    return found, best * s.spacing
+
+
+def journals(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Empty journals for so many voxels, and their counts."""
+    return np.empty(count, np.int32), np.empty(count, np.int32), np.zeros(2, np.int64)

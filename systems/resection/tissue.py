@@ -1,0 +1,250 @@
+"""Labelled tissue as an image has it: a patient's mask, or a synthetic tumour.
+
+Frame P is the patient's (the file's world). Voxels may be longer along one axis
+than along another and lie at any angle.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+BRAIN, TUMOUR, CRITICAL = 0, 1, 2
+"""Labels of a `Tissue`."""
+
+
+@dataclass
+class Tissue:
+    """What lies where before the operation.
+
+    Attributes:
+        labels: BRAIN, TUMOUR or CRITICAL of each voxel, uint8 (nx, ny, nz).
+        X_PV: From voxel indices (i, j, k, 1) to positions in P in m, (4, 4).
+        name: Where it comes from.
+    """
+
+    labels: NDArray[np.uint8]
+    X_PV: NDArray[np.float64]
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        spacing = self.spacing
+        if self.labels.ndim != 3:
+            raise ValueError(
+                f"{self.name}: labels have {self.labels.ndim} axes, expected 3"
+            )
+        if not (np.isfinite(self.X_PV).all() and (spacing > 0.0).all()):
+            raise ValueError(
+                f"{self.name}: spacing of {1e3 * spacing} mm; voxels must be longer "
+                "than zero along all three axes"
+            )
+        if not (self.labels == TUMOUR).any():
+            raise ValueError(f"{self.name}: the mask is empty, no voxel is tumour")
+
+    @property
+    def spacing(self) -> NDArray[np.float64]:
+        """Edges of a voxel in m, (3,)."""
+        return np.linalg.norm(self.X_PV[:3, :3], axis=0)
+
+    @property
+    def tumour_volume(self) -> float:
+        """In m3."""
+        voxel = abs(np.linalg.det(self.X_PV[:3, :3]))
+        return float(np.count_nonzero(self.labels == TUMOUR) * voxel)
+
+    def points(self, label: int = TUMOUR) -> NDArray[np.float64]:
+        """Positions in P of all voxels of a label, (n, 3)."""
+        index = np.argwhere(self.labels == label)
+        return index @ self.X_PV[:3, :3].T + self.X_PV[:3, 3]
+
+    def centre(self) -> NDArray[np.float64]:
+        """Where the tumour's centroid lies in P, (3,)."""
+        return self.points().mean(axis=0)
+
+
+def signed_distance(mask: NDArray[np.bool_], spacing: Sequence[float]) -> NDArray:
+    """Distance to a mask's border in m, > 0 inside: its shape, to be resampled."""
+    inside = ndimage.distance_transform_edt(mask, spacing)
+    outside = ndimage.distance_transform_edt(~mask, spacing)
+    return (inside - outside).astype(np.float32)
+
+
+def one_tumour(mask: NDArray[np.bool_], component: int, name: str) -> NDArray[np.bool_]:
+    """One connected component of a mask.
+
+    Args:
+        mask: Tumour voxels.
+        component: 1 for the largest, 2 for the next, ...; 0 if there must be one
+            alone (specks below 2 % of the whole do not count).
+        name: For the message.
+
+    Raises:
+        ValueError: If there are several and none was chosen, or not so many.
+    """
+    parts, count = ndimage.label(mask, np.ones((3, 3, 3)))
+    sizes = np.bincount(parts.ravel())[1:]
+    order = np.argsort(sizes)[::-1]
+    serious = int(np.count_nonzero(sizes > 0.02 * sizes.sum()))
+    if component == 0 and serious > 1:
+        shares = ", ".join(f"{100 * sizes[n] / sizes.sum():.0f} %" for n in order[:5])
+        raise ValueError(
+            f"{name}: {serious} tumours that do not touch ({shares} of the whole); "
+            "choose one with component=1 (the largest), 2, ..."
+        )
+    if component > count:
+        raise ValueError(f"{name}: component={component}, but there are {count}")
+    return parts == order[max(component, 1) - 1] + 1
+
+
+def load_mask(
+    path: str | Path,
+    tumour: Sequence[int] = (),
+    critical: Sequence[int] = (),
+    component: int = 0,
+) -> Tissue:
+    """Reads a mask from NRRD, NIfTI or any other file that SimpleITK reads.
+
+    Args:
+        path: The file; its own affine is kept (in the file's frame, LPS).
+        tumour: Labels that are tumour; all but 0 and the critical ones if empty.
+        critical: Labels that must not be touched.
+        component: Which connected part is the tumour, see `one_tumour`.
+
+    Raises:
+        ValueError: If the file cannot be read, or does not hold a tumour.
+    """
+    try:
+        import SimpleITK as sitk
+    except ImportError as error:
+        raise ValueError(
+            f"mask {str(path)!r}: reading masks needs SimpleITK, "
+            "pip install 'trocar[masks]'"
+        ) from error
+    if not Path(path).is_file():
+        raise ValueError(f"mask {str(path)!r}: no such file")
+    try:
+        image = sitk.ReadImage(str(path))
+    except RuntimeError as error:
+        raise ValueError(f"mask {str(path)!r} cannot be read: {error}") from error
+    if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
+        raise ValueError(f"mask {str(path)!r} is no image of three axes, one label each")
+    values = sitk.GetArrayFromImage(image).transpose(2, 1, 0)  # to (x, y, z)
+    there = [int(v) for v in np.unique(values)]
+    for label in [*tumour, *critical]:
+        if label not in there:
+            raise ValueError(
+                f"mask {str(path)!r} has no label {label}; there are {there}"
+            )
+    wanted = tumour or [v for v in there if v != 0 and v not in critical]
+    mask = np.isin(values, wanted)
+    name = Path(path).name
+    if not mask.any():
+        raise ValueError(f"{name}: the mask is empty, no voxel is tumour")
+    labels = np.where(one_tumour(mask, component, name), TUMOUR, BRAIN).astype(np.uint8)
+    labels[np.isin(values, critical)] = CRITICAL
+    X = np.eye(4)
+    direction = np.array(image.GetDirection()).reshape(3, 3)
+    X[:3, :3] = 1e-3 * direction * np.array(image.GetSpacing())
+    X[:3, 3] = 1e-3 * np.array(image.GetOrigin())
+    return Tissue(labels, X, name)
+
+
+@dataclass
+class SyntheticTumour:
+    """A seeded, irregular, lobed tumour, with a vessel beside it if wanted.
+
+    Attributes:
+        length: Longest side of its bounding box in m, 0.03 to 0.08.
+        lobes: Number of lobes about its core.
+        roughness: Height of its bumps over its radius.
+        vessel: Radius in m of a critical vessel beside it; 0 for none.
+        vessel_gap: Between the vessel's wall and the tumour's surface, in m.
+        seed: Of its shape.
+    """
+
+    length: float = 0.030
+    lobes: int = 5
+    roughness: float = 0.04
+    vessel: float = 0.0
+    vessel_gap: float = 0.0005
+    seed: int = 1
+
+    def check(self) -> None:
+        """Raises ValueError for a value that makes no sense."""
+        if not 0.005 <= self.length <= 0.1:
+            raise ValueError(
+                f"tumour.length={self.length} m: expected 0.03 to 0.08 (paper, II.B); "
+                f"nearest {min(max(self.length, 0.03), 0.08):g}"
+            )
+        if not 0 <= self.lobes <= 20:
+            raise ValueError(f"tumour.lobes={self.lobes}: expected 0 to 20")
+        for name in ("roughness", "vessel", "vessel_gap"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
+                raise ValueError(f"tumour.{name}={getattr(self, name)}: expected >= 0")
+
+
+def _shape(params: SyntheticTumour, points: NDArray) -> NDArray:
+    """> 0 inside a tumour of radius about one; points (..., 3)."""
+    rng = np.random.default_rng(params.seed)
+    fields = [0.80 - np.linalg.norm(points, axis=-1)]
+    for _ in range(params.lobes):
+        direction = rng.normal(size=3)
+        centre = rng.uniform(0.45, 0.65) * direction / np.linalg.norm(direction)
+        fields.append(
+            rng.uniform(0.38, 0.52) - np.linalg.norm(points - centre, axis=-1)
+        )
+    # A soft union: lobes run into each other without a crease.
+    soft = 0.06
+    field = soft * np.logaddexp.reduce([f / soft for f in fields], axis=0)
+    for _ in range(6):
+        wave = rng.normal(size=3)
+        wave *= rng.uniform(3.0, 7.0) / np.linalg.norm(wave)
+        phase = rng.uniform(0.0, 2 * math.pi)
+        field += params.roughness * np.sin(points @ wave + phase) / math.sqrt(3)
+    return field
+
+
+def synthetic_tumour(params: SyntheticTumour, spacing: float = 1.0e-3) -> Tissue:
+    """Makes a synthetic tumour about the origin of P.
+
+    Args:
+        params: Its shape.
+        spacing: Edge of a voxel in m; shapes are resampled finer later.
+
+    Returns:
+        The tissue, the voxels' axes along those of P.
+    """
+    params.check()
+    axis = np.linspace(-1.5, 1.5, 61)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    inside = np.argwhere(_shape(params, grid) > 0.0)
+    scale = params.length / (0.05 * (np.ptp(inside, axis=0).max() + 1))
+    half = int(math.ceil(1.4 * scale / spacing))
+    axis = np.arange(-half, half + 1) * spacing
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    mask = one_tumour(_shape(params, grid / scale) > 0.0, 1, "synthetic tumour")
+    labels = mask.astype(np.uint8)
+    if params.vessel > 0.0:
+        labels[_vessel(params, mask, axis, grid)] = CRITICAL
+    X = np.eye(4)
+    X[:3, :3] *= spacing
+    X[:3, 3] = axis[0]
+    return Tissue(labels, X, f"synthetic tumour {params.seed}")
+
+
+def _vessel(
+    params: SyntheticTumour, mask: NDArray, axis: NDArray, grid: NDArray
+) -> NDArray[np.bool_]:
+    """A slightly wavy tube along y that passes the tumour's +x side."""
+    distance = -signed_distance(mask, [axis[1] - axis[0]] * 3)
+    middle = 0.12 * params.length * np.sin(grid[..., 1] / params.length * 4.0)
+    for x in axis[axis > 0.0]:
+        away = np.hypot(grid[..., 0] - x, grid[..., 2] - middle)
+        tube = away <= params.vessel
+        if distance[tube].min() >= params.vessel_gap:
+            return tube
+    raise ValueError(f"tumour.vessel={params.vessel} m: no place beside the tumour")
