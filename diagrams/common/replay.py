@@ -32,17 +32,24 @@ def start_meshcat() -> Any:
 class Recorder:
     """Draws frames of a run into a Meshcat recording; without Meshcat, nothing."""
 
-    def __init__(self, meshcat: Any, visualizer: Any, study: Study) -> None:
+    def __init__(
+        self, meshcat: Any, visualizer: Any, study: Study, speed: float = 1.0
+    ) -> None:
         self._meshcat = meshcat
         self._visualizer = visualizer
         self._study = study
+        self._speed = speed
 
     def draw(self, context: Any) -> None:
         """Records the frame of a root context."""
-        if self._visualizer is not None:
-            self._visualizer.ForcedPublish(
-                self._visualizer.GetMyContextFromRoot(context)
-            )
+        if self._visualizer is None:
+            return
+        time = context.get_time()
+        if self._speed > 1.0:  # the visualizer takes its frame from the time
+            context.SetTime(time / self._speed)
+        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(context))
+        if self._speed > 1.0:
+            context.SetTime(time)
 
     def finish(self, run: Any) -> None:
         """Adds the study's decoration and publishes the recording."""
@@ -55,8 +62,12 @@ class Recorder:
         self._meshcat.PublishRecording()
 
 
-def add_recorder(builder: Any, station: Any, meshcat: Any, study: Study) -> Recorder:
+def add_recorder(
+    builder: Any, station: Any, meshcat: Any, study: Study, speed: float = 1.0
+) -> Recorder:
     """Adds the visualizer to a root diagram and starts the recording.
+
+    At a speed above one the replay shows the run so much faster.
 
     The visualizer never publishes by itself: the run draws its frames between
     the timed advances.
@@ -81,7 +92,7 @@ def add_recorder(builder: Any, station: Any, meshcat: Any, study: Study) -> Reco
     # just below its exact value must not fall into the frame before.
     rate = study.frame_rate * (1.0 + 1e-9)
     meshcat.StartRecording(rate, set_visualizations_while_recording=False)
-    return Recorder(meshcat, visualizer, study)
+    return Recorder(meshcat, visualizer, study, speed)
 
 
 def draw_trail(

@@ -46,6 +46,8 @@ class Run:
         instants: Wall seconds of all blocks, one for every whole control instant.
         updates: Median wall seconds of one update, by block.
         error: Why the run ended early, or "".
+        duration: Simulated seconds that the whole run takes.
+        replay_speed: Simulated seconds that a second of the replay shows.
         metrics: The figures, once measured.
     """
 
@@ -58,6 +60,8 @@ class Run:
     instants: list[float] = field(default_factory=list)
     updates: dict[str, float] = field(default_factory=dict)
     error: str = ""
+    duration: float = 0.0
+    replay_speed: float = 1.0
     metrics: dict[str, Any] = field(default_factory=dict)
 
     def matrix(self, name: str) -> np.ndarray:
@@ -112,13 +116,15 @@ def simulate_diagram(
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
     sinks = add_logs(builder, station, study)
-    recorder = replay.add_recorder(builder, station, meshcat, study)
+    duration = study.length(scenario)
+    speed = max(1.0, duration / study.replay_length)
+    recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
     simulator = Simulator(root)
     ApplySimulatorConfig(study.integrator(scenario) or INTEGRATOR, simulator)
     context = simulator.get_mutable_context()
     root.SetRandomContext(context, RandomGenerator(scenario.seed))
-    run = Run(scenario, study, root)
+    run = Run(scenario, study, root, duration=duration, replay_speed=speed)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
@@ -146,7 +152,7 @@ def advance(
     progress: Callable[[float], None],
 ) -> None:
     """Steps the simulator from frame to frame; only the steps are timed."""
-    duration, rate = run.scenario.duration, run.study.frame_rate
+    duration, rate = run.duration, run.study.frame_rate / run.replay_speed
     simulator.Initialize()
     recorder.draw(simulator.get_context())
     time, frame = 0.0, 0

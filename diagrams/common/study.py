@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 import importlib
+import math
 from typing import Any
 
 from diagrams.common.scenario import Scenario, ScenarioError, nearest
@@ -10,6 +11,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 STUDIES = {
     "gauze": "diagrams.gauze.study",
     "snake": "diagrams.resection.snake_study",
+    "resection": "diagrams.resection.resection_study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
 
@@ -45,7 +47,9 @@ class Study:
         integrator: Makes the SimulatorConfig of a scenario; None for that of all
             continuous plants (`diagrams.common.run.INTEGRATOR`).
         view: The replay's camera.
-        frame_rate: Frames of the replay per simulated second [1/s].
+        frame_rate: Frames of the replay per second of it [1/s].
+        length: How long a scenario really runs [s], at most its duration.
+        replay_length: A run longer than this [s] is shown faster.
     """
 
     name: str
@@ -62,6 +66,8 @@ class Study:
     integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)
     frame_rate: float = 30.0
+    length: Callable[[Any], float] = lambda scenario: scenario.duration
+    replay_length: float = math.inf
 
 
 def build(scenario: Any) -> Any:

@@ -115,7 +115,9 @@ def corners(x: Any, h: float, tool: float, out: Any) -> None:
 
 
 @compiled
-def _blame(why: Any, part: int, x: float, y: float, z: float, rho: float, at: int) -> int:
+def _blame(
+    why: Any, part: int, x: float, y: float, z: float, rho: float, at: int
+) -> int:
     why[0], why[1], why[2], why[3] = part, x, y, z
     why[4], why[5] = rho, at
     return BODY

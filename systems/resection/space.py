@@ -94,9 +94,7 @@ def first_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
                 continue
             half = math.sqrt(rest)
             row = (a * ny + b) * nz
-            for c in range(
-                row + math.ceil(w - half), row + math.floor(w + half) + 1
-            ):
+            for c in range(row + math.ceil(w - half), row + math.floor(w + half) + 1):
                 if s.tau[c] == SOLID:
                     return c
     return FREE
@@ -181,9 +179,7 @@ def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
                 continue
             half = math.sqrt(rest)
             row = (a * ny + b) * nz
-            for c in range(
-                row + math.ceil(w - half), row + math.floor(w + half) + 1
-            ):
+            for c in range(row + math.ceil(w - half), row + math.floor(w + half) + 1):
                 if s.allowed[c] == 0:
                     return c
     return FREE
@@ -230,7 +226,9 @@ def roll_back(s: Any, freed: int, roomed: int) -> None:
 
 
 @compiled
-def nearest_in_ball(s: Any, which: int, x: float, y: float, z: float, rho: float) -> Any:
+def nearest_in_ball(
+    s: Any, which: int, x: float, y: float, z: float, rho: float
+) -> Any:
     """The voxel in a ball's way that is nearest to its centre.
 
     Args:

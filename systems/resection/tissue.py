@@ -131,7 +131,9 @@ def load_mask(
     except RuntimeError as error:
         raise ValueError(f"mask {str(path)!r} cannot be read: {error}") from error
     if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
-        raise ValueError(f"mask {str(path)!r} is no image of three axes, one label each")
+        raise ValueError(
+            f"mask {str(path)!r} is no image of three axes, one label each"
+        )
     values = sitk.GetArrayFromImage(image).transpose(2, 1, 0)  # to (x, y, z)
     there = [int(v) for v in np.unique(values)]
     for label in [*tumour, *critical]:
@@ -190,7 +192,7 @@ class SyntheticTumour:
 def _shape(params: SyntheticTumour, points: NDArray) -> NDArray:
     """> 0 inside a tumour of radius about one; points (..., 3)."""
     rng = np.random.default_rng(params.seed)
-    fields = [0.80 - np.linalg.norm(points, axis=-1)]
+    fields: list[NDArray] = [0.80 - np.linalg.norm(points, axis=-1)]
     for _ in range(params.lobes):
         direction = rng.normal(size=3)
         centre = rng.uniform(0.45, 0.65) * direction / np.linalg.norm(direction)
@@ -199,7 +201,7 @@ def _shape(params: SyntheticTumour, points: NDArray) -> NDArray:
         )
     # A soft union: lobes run into each other without a crease.
     soft = 0.06
-    field = soft * np.logaddexp.reduce([f / soft for f in fields], axis=0)
+    field: NDArray = soft * np.logaddexp.reduce([f / soft for f in fields], axis=0)
     for _ in range(6):
         wave = rng.normal(size=3)
         wave *= rng.uniform(3.0, 7.0) / np.linalg.norm(wave)

@@ -126,8 +126,8 @@ class Volume:
             self.allowed.reshape(-1),
             self.inside.reshape(-1),
             self.roomy.reshape(-1),
-            tuple(self.labels.shape),  # type: ignore[arg-type]
-            tuple(map(float, self.origin)),  # type: ignore[arg-type]
+            tuple(self.labels.shape),
+            (float(self.origin[0]), float(self.origin[1]), float(self.origin[2])),
             self.spacing,
             self.channel,
             self.depth,
@@ -170,7 +170,7 @@ class Volume:
     def index_of(self, p_W: Vector) -> tuple[int, int, int]:
         """The voxel of a point in W, kept within the grid."""
         raw = np.rint((np.asarray(p_W) - self.origin) / self.spacing).astype(int)
-        return tuple(np.clip(raw, 0, np.array(self.labels.shape) - 1))  # type: ignore[return-value]
+        return tuple(np.clip(raw, 0, np.array(self.labels.shape) - 1))
 
 
 def channel_frame(body: Tissue, access: Access) -> Vector:
@@ -272,7 +272,12 @@ def make_volume(
 
 
 def _resampled(
-    body: Tissue, source: int, X_VW: Vector, origin: Vector, spacing: float, size: Vector
+    body: Tissue,
+    source: int,
+    X_VW: Vector,
+    origin: Vector,
+    spacing: float,
+    size: Vector,
 ) -> NDArray[np.bool_]:
     """Where on the grid the shape of a label is."""
     mask = np.pad(body.labels == source, 2)

@@ -1,0 +1,234 @@
+"""The automatic planner: entry, greedy clipped procedures, finisher.
+
+Space only grows, so a procedure that is feasible stays so, and a greedy choice can
+waste procedures but never lose tissue. The entry is driven in passes of growing
+bend: the pilot makes the room in which the next pass may bend. Then come the
+procedures that gain most among random ones, and at last single steps, lump by lump.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import math
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plants.snake.last_module import meridian
+from systems.resection.growth import grow, seed_random
+from systems.resection.procedure import ELEMENTARY, ENTRY, Procedure
+from systems.resection.session import Session
+from systems.resection.space import SOLID
+from systems.resection.sweep import (
+    intermediate,
+    straightened,
+    sweep_procedure,
+    try_procedure,
+)
+from systems.resection.tree import extend, nearest_nodes
+
+
+@dataclass
+class PlannerParams:
+    """How the planner goes about it.
+
+    Attributes:
+        target: Share of the reachable part at which it stops.
+        pitch: Of poses when carried out, in m.
+        trial_pitch: Of poses when a candidate is tried, in m.
+        passes: Largest bends of the entry's passes, in rad.
+        candidates: Procedures tried for one that is chosen.
+        lengths: Of candidates, in m.
+        least_gain: Of a procedure, as a share of the reachable part; below it the
+            finisher takes over.
+        lump: How far, in m, the finisher looks from where it starts a lump.
+        step_gain: Tumour that a step of the finisher must free, in m3.
+        time_limit: After which the finisher ends, in s.
+        seed: Of all random choices.
+    """
+
+    target: float = 0.986
+    pitch: float = 2.0e-3
+    trial_pitch: float = 3.0e-3
+    passes: list[float] = field(
+        default_factory=lambda: [math.radians(8.0), math.radians(20.0), math.pi / 4]
+    )
+    candidates: int = 32
+    lengths: list[float] = field(default_factory=lambda: [0.0, 0.006, 0.012])
+    least_gain: float = 0.005
+    lump: float = 0.008
+    step_gain: float = 0.6e-9
+    time_limit: float = 120.0
+    seed: int = 1
+
+    def check(self) -> None:
+        """Raises ValueError for a value that makes no sense."""
+        if not 0.0 < self.target <= 1.0:
+            raise ValueError(f"planner.target={self.target}: expected 0 to 1")
+        for name in ("pitch", "trial_pitch"):
+            if not 5e-4 <= getattr(self, name) <= 6e-3:
+                raise ValueError(
+                    f"planner.{name}={getattr(self, name)} m: expected 0.0005 to 0.006"
+                )
+        if self.candidates < 1 or not self.lengths or min(self.lengths) < 0.0:
+            raise ValueError(
+                "planner.candidates and planner.lengths: expected at least one each"
+            )
+        if not all(0.0 < bend <= math.pi / 4 + 1e-9 for bend in self.passes):
+            raise ValueError(f"planner.passes={self.passes} rad: expected 0 to pi/4")
+
+
+class Planner:
+    """Plans a session to its end, step by step."""
+
+    def __init__(
+        self,
+        session: Session,
+        reachable: NDArray[np.bool_],
+        params: PlannerParams | None = None,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
+        """Makes a planner.
+
+        Args:
+            session: What is planned; it may have steps already.
+            reachable: Tumour voxels that can be reached, the goal.
+            params: How.
+            progress: Called with the share of the goal that is planned.
+        """
+        self.session = session
+        self.params = params or PlannerParams()
+        self.params.check()
+        self.goal = np.flatnonzero(reachable.reshape(-1)).astype(np.int32)
+        self.progress = progress
+        self.rng = np.random.default_rng(self.params.seed)
+        self.deadline = perf_counter() + self.params.time_limit
+
+    def left(self) -> NDArray[np.int32]:
+        """Voxels of the goal that are still there."""
+        tau = self.session.volume.tau.reshape(-1)
+        return self.goal[tau[self.goal] == SOLID]
+
+    @property
+    def share(self) -> float:
+        """Of the goal that is planned."""
+        return 1.0 - len(self.left()) / max(len(self.goal), 1)
+
+    def run(self) -> None:
+        """Plans to the target, or as far as it goes, and home."""
+        seed_random(self.params.seed + len(self.session.steps))
+        if not any(step.kind == ENTRY for step in self.session.steps):
+            self.enter()
+        while self.share < self.params.target and self.choose():
+            self.progress(self.share)
+        while self.share < self.params.target and perf_counter() < self.deadline:
+            if not self.finish():
+                break
+            self.progress(self.share)
+        if self.session.steps and self.session.steps[-1].kind != "home":
+            self.session.go_home()
+
+    def _radius(self, bend: float) -> float:
+        params = self.session.params
+        return float(meridian(bend, params)[0]) + params.tool_radius
+
+    def enter(self) -> None:
+        """The entry's passes, to the far end of the tumour."""
+        volume = self.session.volume
+        deepest = float(volume.points(volume.labels == 1)[:, 2].max())
+        length = deepest - volume.depth + self.session.params.tool_radius
+        travel = self.session.params.travel[1] - float(self.session.home[0])
+        length = min(max(length, self.params.pitch), travel)
+        for number, bend in enumerate(self.params.passes):
+            name = "pilot entry" if number == 0 else f"entry {number + 1}"
+            self.session.commit(
+                Procedure(
+                    kind=ENTRY,
+                    length=length,
+                    radius=self._radius(bend),
+                    clipped=True,
+                    pitch=self.params.pitch,
+                    name=name,
+                )
+            )
+            self.progress(self.share)
+
+    def choose(self) -> bool:
+        """Commits the best of some random procedures; False if none is worth it."""
+        session, params = self.session, self.params
+        session.volume.forget_journals()
+        session.make_room()
+        s, b, t, why = session.volume.space(), session.body, session.tree, session.why
+        left = self.left()
+        found, far = np.empty(16, np.int64), np.empty(16)
+        best: tuple[int, int, NDArray, float] = (0, 0, np.empty(7), 0.0)
+        for _ in range(params.candidates):
+            p = session.volume.centre_of(int(left[self.rng.integers(len(left))]))
+            nearest_nodes(t, p[0], p[1], p[2], found, far)
+            node = int(found[self.rng.integers(16)])
+            x = np.empty(7)
+            if node < 0 or not straightened(b, t.x[node], p, self.rng.random(), x):
+                continue
+            length = float(self.rng.choice(params.lengths))
+            pitch = params.trial_pitch
+            gain = try_procedure(
+                s, b, t, node, x, length, pitch, math.pi / 4, pitch, why
+            )
+            if gain > best[0]:
+                best = (gain, node, x, length)
+        gain, node, x, length = best
+        if gain < params.least_gain * len(self.goal):
+            return False
+        before = session._standing()
+        p_I, n = np.empty(3), np.empty(3)
+        intermediate(b, x, p_I, n)
+        if extend(s, b, t, node, x, why) < 0:
+            return False
+        start = t.tip[t.route[t.size[1] - 1]].tolist()
+        pitch = params.pitch
+        bend = session.params.max_bend
+        sweep_procedure(s, b, t, n, length, pitch, bend, pitch, False, why)
+        number = 1 + sum(step.kind == ELEMENTARY for step in session.steps)
+        procedure = Procedure(
+            ELEMENTARY, start, n.tolist(), length, self._radius(bend), True, pitch
+        )
+        session.record(f"procedure {number}", ELEMENTARY, before, procedure)
+        return True
+
+    def finish(self) -> bool:
+        """Single steps in the lumps that are left, nearest first; False if vain."""
+        session, params = self.session, self.params
+        session.volume.forget_journals()
+        session.make_room()
+        before = session._standing()
+        volume = session.volume
+        s, b, t, why = volume.space(), session.body, session.tree, session.why
+        least = max(1, round(params.step_gain / volume.voxel))
+        left = self.left()
+        size = np.array(volume.labels.shape)
+        points = np.column_stack(np.unravel_index(left, size)) * volume.spacing
+        open_ = np.ones(len(left), bool)
+        made = 0
+        while open_.any() and perf_counter() < self.deadline:
+            tip = t.tip[t.route[t.size[1] - 1]] - volume.origin
+            rest = np.flatnonzero(open_)
+            seed = rest[int(np.argmin(((points[rest] - tip) ** 2).sum(axis=1)))]
+            near = ((points - points[seed]) ** 2).sum(axis=1) < params.lump**2
+            lump = left[near & open_]
+            open_ &= ~near
+            tries = np.zeros(len(lump), np.int32)
+            for _ in range(8):
+                done = grow(
+                    s, b, t, lump, tries, 20 * len(lump) + 200, least, True, why
+                )
+                made += done
+                alive = (s.tau[lump] == SOLID) & (tries < 100)
+                lump, tries = lump[alive], tries[alive]
+                if done == 0 or len(lump) == 0:
+                    break
+            if self.share >= params.target or t.size[0] + 20_000 > len(t.x):
+                break
+        if made:
+            number = 1 + sum(step.kind == "finish" for step in session.steps)
+            session.record(f"finish {number}", "finish", before)
+        return made > 0
