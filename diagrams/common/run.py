@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 import gc
 import json
+import math
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -117,7 +118,7 @@ def simulate_diagram(
     station = builder.AddNamedSystem("station", diagram)
     sinks = add_logs(builder, station, study)
     duration = study.length(scenario)
-    speed = max(1.0, duration / study.replay_length)
+    speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
     simulator = Simulator(root)
@@ -143,6 +144,18 @@ def simulate_diagram(
         run.metrics = metrics.common(run) | study.measure(run)
     recorder.finish(run)
     return run
+
+
+def replay_speed(study: Study, duration: float) -> float:
+    """How much faster than the run [s] its replay is.
+
+    Frames of a run that is shown faster fall on instants of the log, which lie on
+    the control clock: stopping between those would shorten the integrator's steps.
+    """
+    if duration <= study.replay_length:
+        return 1.0
+    interval = duration / study.replay_length / study.frame_rate
+    return math.ceil(interval / study.log_period) * study.log_period * study.frame_rate
 
 
 def advance(

@@ -1,7 +1,8 @@
 """The scenario of a resection, and the plan that comes of it before anything moves."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
+import math
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -30,6 +31,9 @@ from systems.resection.wire_drums import WireDrumsParams
 from systems.resection.wire_inverse_actuation import WireInverseActuationParams
 from systems.resection.wire_tension import WireTensionParams
 from systems.resection.wire_watch import WireWatchParams
+
+LOG_PERIOD = 0.1
+"""Of a resection's signals, in s; runs last a multiple of it."""
 
 
 @dataclass
@@ -63,6 +67,8 @@ class ResectionScenario(Scenario):
         margin: Distance to what is critical that must be kept, in m.
         tracking: What the plan keeps beyond that, for tracking errors, in m.
         clearance: Between body and tissue in the plan, in m.
+        accuracy: By which the plan takes the tool for smaller where it frees space,
+            in m.
         procedures: The surgeon's, in their order; refused ones are left out.
         automatic: Whether the planner goes on after them.
         planner: How.
@@ -79,6 +85,7 @@ class ResectionScenario(Scenario):
     margin: float = 1.0e-3
     tracking: float = 0.3e-3
     clearance: float = 0.15e-3
+    accuracy: float = 0.05e-3
     procedures: list[Procedure] = field(default_factory=list)
     automatic: bool = False
     planner: PlannerParams = field(default_factory=PlannerParams)
@@ -125,7 +132,7 @@ def check(scenario: ResectionScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
     if not scenario.period > 0.0:
         raise ScenarioError(f"period={scenario.period} s: expected > 0, e.g. 0.02")
-    for name in ("margin", "tracking", "clearance"):
+    for name in ("margin", "tracking", "clearance", "accuracy"):
         if not 0.0 <= getattr(scenario, name) <= 0.01:
             raise ScenarioError(
                 f"{name}={getattr(scenario, name)} m: expected 0 to 0.01"
@@ -171,7 +178,8 @@ def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
         scenario.spacing,
         scenario.margin + scenario.tracking,
     )
-    return Session(volume, scenario.snake, scenario.clearance), tissue.name
+    session = Session(volume, scenario.snake, scenario.clearance, scenario.accuracy)
+    return session, tissue.name
 
 
 def plan_operation(scenario: ResectionScenario) -> Operation:
@@ -239,4 +247,6 @@ def _planned(text: str, holder: _Holder) -> Operation:
 
 def length(scenario: ResectionScenario) -> float:
     """How long the run takes in s."""
-    return min(scenario.duration, plan_operation(scenario).duration(scenario.player))
+    player = replace(scenario.player, lead=scenario.period)
+    needed = plan_operation(scenario).duration(player)
+    return min(scenario.duration, math.ceil(needed / LOG_PERIOD) * LOG_PERIOD)

@@ -7,7 +7,12 @@ from diagrams.resection.resection_diagram import make_resection_diagram
 from diagrams.resection.resection_metrics import measure
 from diagrams.resection.resection_plots import plots
 from diagrams.resection.resection_replay import decorate
-from diagrams.resection.resection_scenario import ResectionScenario, check, length
+from diagrams.resection.resection_scenario import (
+    LOG_PERIOD,
+    ResectionScenario,
+    check,
+    length,
+)
 
 XYZ = ("x", "y", "z")
 TOOL = (*XYZ, "n_x", "n_y", "n_z")
@@ -39,7 +44,7 @@ STUDY = Study(
     check=check,
     measure=measure,
     signals=SIGNALS,
-    log_period=0.1,
+    log_period=LOG_PERIOD,
     plots=plots,
     decorate=decorate,
     controller="resection_ik",

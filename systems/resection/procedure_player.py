@@ -19,7 +19,7 @@ class ProcedurePlayerParams:
     """Parameters of `ProcedurePlayer`.
 
     Attributes:
-        lead: How far ahead of time ``target`` is, in s.
+        lead: How far ahead of time ``target`` is, the control period, in s.
         bend_rate: Largest rate of a or b of a ball, in rad/s.
         travel_rate: Largest speed of the translation, in m/s.
         dwell: At the beginning and at the end, in s.
@@ -27,7 +27,7 @@ class ProcedurePlayerParams:
 
     lead: float = 0.02
     bend_rate: float = 1.2
-    travel_rate: float = 0.025
+    travel_rate: float = 0.010
     dwell: float = 0.3
 
     def check(self) -> None:
@@ -41,7 +41,7 @@ class ProcedurePlayerParams:
 
 
 def schedule(x: NDArray[np.float64], params: ProcedurePlayerParams) -> NDArray:
-    """When each posture is reached, in s, (n,).
+    """When each posture is reached, in s, (n,): instants of control, `lead` apart.
 
     Args:
         x: Postures (n, 7) as s, a1, b1, ..., b3.
@@ -53,7 +53,10 @@ def schedule(x: NDArray[np.float64], params: ProcedurePlayerParams) -> NDArray:
     time = np.maximum(
         step[:, 0] / params.travel_rate, step[:, 1:].max(axis=1) / params.bend_rate
     )
-    return params.dwell + np.concatenate([[0.0], np.cumsum(time)])
+    # Whole control periods, so that no corner of the path falls between two instants.
+    time = np.maximum(np.ceil(time / params.lead - 1e-6), 1.0) * params.lead
+    start = math.ceil(params.dwell / params.lead) * params.lead
+    return start + np.concatenate([[0.0], np.cumsum(time)])
 
 
 class ProcedurePlayer(Block):

@@ -171,7 +171,7 @@ def _reason(
             blame["beyond the robot's bends"] += 1
             continue
         corners(x, body.h, body.tool, c)
-        if check_body(s, body, c, False, why) == OK:
+        if check_body(s, body, c, 0, why) == OK:
             blame[NO_WAY] += 3
             continue
         at = int(why[5])

@@ -79,19 +79,22 @@ class Session:
         volume: The tissue.
         params: The robot.
         clearance: That the plan keeps between body and tissue, in m.
+        accuracy: To which the robot follows the plan, in m: its tool surely frees
+            a ball that is smaller by this.
         steps: What has been committed.
         file: Where every commit is saved; nowhere if None.
     """
 
     volume: Volume
     params: SnakeParams
-    clearance: float = 1.0e-4
+    clearance: float = 0.15e-3
+    accuracy: float = 0.05e-3
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
 
     def __post_init__(self) -> None:
         self.params.check()
-        self.body: Body = body_of(self.params, self.clearance)
+        self.body: Body = body_of(self.params, self.clearance, self.accuracy)
         self.home = home_posture(self.volume, self.params)
         c = np.empty((8, 3))
         corners(self.home, self.body.h, self.body.tool, c)
@@ -163,7 +166,7 @@ class Session:
         params = with_tool(self.params, procedure.tool)
         body = self.body
         if procedure.tool is not None:
-            body = body_of(params, self.clearance)
+            body = body_of(params, self.clearance, self.accuracy)
         if procedure.kind == ENTRY:
             start = np.array([0.0, 0.0, self.volume.depth - params.tool_radius])
         else:
@@ -299,6 +302,7 @@ class Session:
             "channel_depth": v.depth,
             "margin": v.margin,
             "clearance": self.clearance,
+            "accuracy": self.accuracy,
             "params": asdict(self.params),
             "steps": [asdict(step) for step in self.steps],
         }
@@ -353,7 +357,9 @@ def load_session(path: Path) -> Session:
         meta["margin"],
         arrays["tau"],
     )
-    session = Session(volume, SnakeParams(**meta["params"]), meta["clearance"])
+    session = Session(
+        volume, SnakeParams(**meta["params"]), meta["clearance"], meta["accuracy"]
+    )
     nodes, visits = len(arrays["x"]), len(arrays["route"])
     tree = grown(session.tree, nodes, visits)
     for name in ("x", "parent", "depth", "tip"):

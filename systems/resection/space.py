@@ -132,14 +132,56 @@ def body_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
 
 
 @compiled
-def point_solid(s: Any, x: float, y: float, z: float) -> int:
-    """Whether a point lies in tissue: its voxel, FREE or OUTSIDE."""
-    if z <= s.depth and x * x + y * y <= s.channel * s.channel:
+def plate_solid(
+    s: Any,
+    x: float,
+    y: float,
+    z: float,
+    n0: float,
+    n1: float,
+    n2: float,
+    length: float,
+    rho: float,
+) -> int:
+    """The first voxel that a cylinder would meet: its flat index, FREE or OUTSIDE.
+
+    The cylinder starts at (x, y, z) and is `length` m long along (n0, n1, n2).
+    """
+    end = z + length * n2
+    rim = rho * math.sqrt(max(1.0 - n2 * n2, 0.0))
+    out = math.sqrt(x * x + y * y)
+    far = math.sqrt((x + length * n0) ** 2 + (y + length * n1) ** 2)
+    if max(z, end) + rim <= s.depth and max(out, far) + rho <= s.channel:
         return FREE
-    at = voxel_of(s, x, y, z)
-    if at >= 0 and s.tau[at] != SOLID:
-        return FREE
-    return at
+    half = length / 2
+    u = (x + half * n0 - s.origin[0]) / s.spacing
+    v = (y + half * n1 - s.origin[1]) / s.spacing
+    w = (z + half * n2 - s.origin[2]) / s.spacing
+    r, h = rho / s.spacing, half / s.spacing
+    du = h * abs(n0) + r * math.sqrt(max(1.0 - n0 * n0, 0.0))
+    dv = h * abs(n1) + r * math.sqrt(max(1.0 - n1 * n1, 0.0))
+    dw = h * abs(n2) + r * math.sqrt(max(1.0 - n2 * n2, 0.0))
+    nx, ny, nz = s.size
+    if not (
+        u - du >= -0.5
+        and v - dv >= -0.5
+        and w - dw >= -0.5
+        and u + du <= nx - 0.5
+        and v + dv <= ny - 0.5
+        and w + dw <= nz - 0.5
+    ):
+        return OUTSIDE
+    for a in range(math.ceil(u - du), math.floor(u + du) + 1):
+        for b in range(math.ceil(v - dv), math.floor(v + dv) + 1):
+            row = (a * ny + b) * nz
+            for c in range(math.ceil(w - dw), math.floor(w + dw) + 1):
+                if s.tau[row + c] == SOLID:
+                    e0, e1, e2 = a - u, b - v, c - w
+                    along = e0 * n0 + e1 * n1 + e2 * n2
+                    across = e0 * e0 + e1 * e1 + e2 * e2 - along * along
+                    if abs(along) <= h and across <= r * r:
+                        return row + c
+    return FREE
 
 
 @compiled

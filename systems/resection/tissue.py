@@ -201,7 +201,7 @@ def _shape(params: SyntheticTumour, points: NDArray) -> NDArray:
         )
     # A soft union: lobes run into each other without a crease.
     soft = 0.06
-    field: NDArray = soft * np.logaddexp.reduce([f / soft for f in fields], axis=0)
+    field = soft * np.logaddexp.reduce([f / soft for f in fields], axis=0)
     for _ in range(6):
         wave = rng.normal(size=3)
         wave *= rng.uniform(3.0, 7.0) / np.linalg.norm(wave)
@@ -226,15 +226,15 @@ def synthetic_tumour(params: SyntheticTumour, spacing: float = 1.0e-3) -> Tissue
     inside = np.argwhere(_shape(params, grid) > 0.0)
     scale = params.length / (0.05 * (np.ptp(inside, axis=0).max() + 1))
     half = int(math.ceil(1.4 * scale / spacing))
-    axis = np.arange(-half, half + 1) * spacing
-    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    line = np.arange(-half, half + 1) * spacing
+    grid = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1)
     mask = one_tumour(_shape(params, grid / scale) > 0.0, 1, "synthetic tumour")
     labels = mask.astype(np.uint8)
     if params.vessel > 0.0:
-        labels[_vessel(params, mask, axis, grid)] = CRITICAL
+        labels[_vessel(params, mask, line, grid)] = CRITICAL
     X = np.eye(4)
     X[:3, :3] *= spacing
-    X[:3, 3] = axis[0]
+    X[:3, 3] = line[0]
     return Tissue(labels, X, f"synthetic tumour {params.seed}")
 
 

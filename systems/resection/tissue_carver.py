@@ -80,7 +80,7 @@ def carve(
         for r in range(7):
             x[r] = x0[r] + n / steps * (x1[r] - x0[r])
         corners(x, b.h, b.tool, c)
-        hits += check_body(s, b, c, False, why) != OK
+        hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
         stamp(s, c[7, 0], c[7, 1], c[7, 2], b.radius, time)
         for m in range(first, s.used[0]):
