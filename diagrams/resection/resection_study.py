@@ -49,7 +49,7 @@ STUDY = Study(
     decorate=decorate,
     controller="resection_ik",
     integrator=integrator,
-    view=View(camera=(0.085, -0.10, 0.045), target=(0.0, 0.0, 0.015)),
+    view=View(camera=(0.055, -0.075, 0.035), target=(0.0, 0.0, 0.014)),
     frame_rate=10.0,
     length=length,
     replay_length=45.0,

@@ -185,9 +185,11 @@ def explain(
     )
     at = int(voxel) if voxel != OUTSIDE else int(why[5])
     gap = max(float(why[4]) - distance, 0.0) if math.isfinite(distance) else 0.0
-    if why[4] == 0.0:
-        gap = volume.spacing / 2  # a point in tissue: half a voxel is what is known
+    if PARTS[int(why[0])] == "the last plate":
+        gap = max(gap, volume.spacing / 2)  # at its edge no more is known
     where = volume.centre_of(at) if at >= 0 else why[1:4]
+    if at < 0 and where[2] <= volume.depth:
+        gap = math.hypot(where[0], where[1]) + float(why[4]) - volume.channel
     label = int(volume.labels.reshape(-1)[at]) if at >= 0 else -1
     forbidden = at >= 0 and not volume.allowed.reshape(-1)[at]
     in_wall = where[2] <= volume.depth and math.hypot(where[0], where[1]) < 1.6 * (

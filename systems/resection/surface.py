@@ -9,7 +9,7 @@ def surface(
     inside: NDArray[np.bool_],
     origin: NDArray[np.float64],
     spacing: float,
-    smooth: float = 0.6,
+    smooth: float = 0.9,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Meshes the border of a mask.
 

@@ -253,6 +253,8 @@ def make_volume(
     border = edge + 4 * spacing + margin
     channel = body_radius + access.clearance
     low = np.minimum(points.min(axis=0) - border, -channel - 2 * spacing)
+    # A body part that reaches out of the channel's end must lie in the grid whole.
+    low[2] = min(low[2], -3 * body_radius)
     high = np.maximum(points.max(axis=0) + border, channel + 2 * spacing)
     first = np.floor(low / spacing).astype(int)
     size = np.ceil(high / spacing).astype(int) - first + 1
