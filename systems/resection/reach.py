@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from systems.resection.growth import TRIES, grow, seed_random, tilted, tool_posture
 from systems.resection.session import Session
-from systems.resection.snake_body import OK, check_body, corners
+from systems.resection.snake_body import OK, body_of, check_body, corners
 from systems.resection.space import FREE, SOLID, first_forbidden
 from systems.resection.tree import grown, new_tree
 from systems.resection.volume import CRITICAL, NAMES, TUMOUR, Volume
@@ -77,7 +77,7 @@ def find_reach(
         explain: Whether to say why the rest is not reached.
     """
     start = perf_counter()
-    volume, body = session.volume.fresh(), session.body
+    volume, body = session.volume.fresh(), body_of(session.params)
     s, why = volume.space(), np.zeros(6)
     seed_random(seed)
     tree = new_tree(session.home, session.tree.tip[0], ROUND, ROUND)
@@ -153,7 +153,7 @@ def _reason(
         return "within the margin of what is critical"
     if narrow.sum() > 0.5 * mask.sum():
         return TOO_NARROW
-    body, s, why = session.body, volume.space(), np.zeros(6)
+    body, s, why = body_of(session.params), volume.space(), np.zeros(6)
     rng = np.random.default_rng(1)
     blame: Counter[str] = Counter()
     p, n, m, x = np.empty((1, 3)), np.empty((1, 3)), np.empty((1, 3)), np.empty(7)
