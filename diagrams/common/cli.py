@@ -22,6 +22,7 @@ examples:
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
+  trocar resect resect_paper                plan a resection by hand
 """
 
 
@@ -60,6 +61,19 @@ def make_parser() -> argparse.ArgumentParser:
     draw.add_argument("name", metavar="NAME", help="a scenario's name or its file")
     draw.add_argument(
         "--out", metavar="FILE", type=Path, help="SVG or PNG; default: out/NAME.svg"
+    )
+    resect = commands.add_parser(
+        "resect",
+        help="plan a resection by hand, line by line",
+        description="Proposes, checks, commits and undoes procedures; `help` lists "
+        "the commands. The session is saved after every commit, and resumed.",
+    )
+    resect.add_argument("name", metavar="NAME", help="a resection scenario")
+    resect.add_argument(
+        "--session", metavar="FILE", type=Path, help="default: out/NAME.session"
+    )
+    resect.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
     )
     return parser
 
@@ -129,6 +143,19 @@ def diagram_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def resect_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar resect`."""
+    from diagrams.resection.resect_cli import run_console
+
+    scenario = load_scenario(arguments.name, arguments.overrides)
+    if scenario.system != "resection":
+        raise ScenarioError(f"{arguments.name!r} is no resection")
+    name = default_name(arguments.name)
+    file = arguments.session or Path("out") / f"{name}.session"
+    run_console(scenario, file, sys.stdin, sys.stdin.isatty())
+    return 0
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
@@ -142,6 +169,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             return run_command(arguments)
         if arguments.command == "diagram":
             return diagram_command(arguments)
+        if arguments.command == "resect":
+            return resect_command(arguments)
         list_scenarios()
         return 0
     except ScenarioError as error:
