@@ -1,0 +1,84 @@
+"""Resection: feasibility, map, plan and reach in a tumour of some 65 cm3."""
+
+import resource
+from time import perf_counter
+
+import numpy as np
+
+from plants.snake.parameters import SnakeParams
+from systems.resection.feasibility_map import feasibility_map
+from systems.resection.planner import Planner
+from systems.resection.procedure import Procedure
+from systems.resection.reach import find_reach
+from systems.resection.session import Session
+from systems.resection.sweep import intermediate
+from systems.resection.tissue import SyntheticTumour, synthetic_tumour
+from systems.resection.volume import Access, make_volume
+
+LENGTH = 0.058
+"""Of the tumour's bounding box in m: some 65 cm3."""
+
+
+def new_session(seed: int) -> Session:
+    """A session at its beginning, voxels of 0.5 mm."""
+    tissue = synthetic_tumour(SyntheticTumour(length=LENGTH, seed=seed))
+    access = Access(direction=[0.0, 0.0, -1.0])
+    return Session(make_volume(tissue, access, 4e-3), SnakeParams())
+
+
+def random_procedure(session: Session, rng: np.random.Generator) -> Procedure:
+    """One of 12 mm, rings 3 mm apart, somewhere the tool has been."""
+    x = session.postures[rng.integers(len(session.postures))].copy()
+    x[1:5] += rng.normal(size=4) * 0.05
+    p, n = np.empty(3), np.empty(3)
+    intermediate(session.body, x, p, n)
+    ahead = session.params.straight_module + session.params.tool_offset
+    position = (p + ahead * n / np.linalg.norm(n)).tolist()
+    radius = float(rng.uniform(0.008, 0.016))
+    clipped = bool(rng.integers(2))
+    return Procedure("elementary", position, n.tolist(), 0.012, radius, clipped, 3e-3)
+
+
+def report(seed: int, scenes: int) -> str:
+    """Times of the project's own measures; `scenes` procedures are checked."""
+    warm = new_session(seed)
+    Planner(warm, warm.volume.allowed > 0).enter()
+    warm.check(random_procedure(warm, np.random.default_rng(seed)))
+    feasibility_map(warm, 10)
+    session = new_session(seed)
+    lines = [f"  tumour {1e6 * session.volume.tumour_volume:.1f} cm3, 0.5 mm voxels"]
+    reach = find_reach(session, seed)
+    lines.append(f"  reachable {reach.fraction:.4f} in {reach.time:.1f} s")
+    twice = find_reach(session, seed, 2.0, explain=False)
+    lines.append(f"  with twice the effort {twice.fraction:.4f} in {twice.time:.1f} s")
+    planner = Planner(session, reach.mask)
+    planner.enter()
+    rng = np.random.default_rng(seed)
+    times = []
+    for _ in range(min(scenes, 100)):
+        procedure = random_procedure(session, rng)
+        start = perf_counter()
+        session.check(procedure)
+        times.append(perf_counter() - start)
+    middle, most = np.percentile(times, [50, 90]) * 1e3
+    lines.append(f"  feasibility {middle:.1f} ms median, {most:.1f} ms nine in ten")
+    start = perf_counter()
+    found = feasibility_map(session, 1000)
+    lines.append(
+        f"  map of {len(found.points)} in {perf_counter() - start:.2f} s, "
+        f"{found.feasible.mean():.0%} feasible"
+    )
+    session = new_session(seed)
+    start = perf_counter()
+    Planner(session, reach.mask).run()
+    lines.append(
+        f"  plan of {session.fraction / reach.fraction:.4f} of the reachable part in "
+        f"{perf_counter() - start:.1f} s, {len(session.steps)} steps"
+    )
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    lines.append(f"  memory {memory:.2f} GB")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(report(1, 100))
