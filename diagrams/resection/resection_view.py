@@ -41,7 +41,7 @@ def show_session(
     )
     for path in ("/Grid", "/Axes"):
         meshcat.SetProperty(path, "visible", False)
-    meshcat.SetCameraPose([0.045, -0.085, 0.03], [0.0, 0.0, 0.014])
+    meshcat.SetCameraPose([0.03, -0.055, 0.02], [0.0, 0.0, 0.006])
     if found is None or len(found.points) == 0:
         meshcat.SetTriangleMesh("tumour", vertices.T, faces.T, TISSUE)
     else:

@@ -1,6 +1,7 @@
 """Where an elementary volume is feasible now: a map over the surface of free space."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from systems.resection.volume import CRITICAL, TUMOUR
 
 NODES = 4
 """Postures of the tree from which a volume is tried."""
+
+TURNS = (0.6, 0.2)
+"""How far, as a share, their axes are turned towards the point."""
 
 
 @dataclass
@@ -83,8 +87,8 @@ def feasibility_map(
     for n, p in enumerate(points):
         nearest_nodes(tree, p[0], p[1], p[2], found, far)
         reason = "limit"
-        for node in found[found >= 0]:
-            if not straightened(body, tree.x[node], p, 0.7, x):
+        for node, turn in product(found[found >= 0], TURNS):
+            if not straightened(body, tree.x[node], p, turn, x):
                 continue
             gain = try_procedure(
                 s, body, tree, int(node), x, 0.0, pitch, bend, pitch, why

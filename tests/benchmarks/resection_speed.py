@@ -1,7 +1,7 @@
 """Resection: feasibility, map, plan and reach in a tumour of some 65 cm3."""
 
 import resource
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
@@ -40,40 +40,44 @@ def random_procedure(session: Session, rng: np.random.Generator) -> Procedure:
 
 
 def report(seed: int, scenes: int) -> str:
-    """Times of the project's own measures; `scenes` procedures are checked."""
+    """Processor time of each part; `scenes` procedures are checked."""
     warm = new_session(seed)
     Planner(warm, warm.volume.allowed > 0).enter()
     warm.check(random_procedure(warm, np.random.default_rng(seed)))
     feasibility_map(warm, 10)
     session = new_session(seed)
     lines = [f"  tumour {1e6 * session.volume.tumour_volume:.1f} cm3, 0.5 mm voxels"]
+    start = process_time()
     reach = find_reach(session, seed)
-    lines.append(f"  reachable {reach.fraction:.4f} in {reach.time:.1f} s")
+    spent = process_time() - start
+    lines.append(f"  reachable {reach.fraction:.4f} in {spent:.1f} s")
+    start = process_time()
     twice = find_reach(session, seed, 2.0, explain=False)
-    lines.append(f"  with twice the effort {twice.fraction:.4f} in {twice.time:.1f} s")
+    spent = process_time() - start
+    lines.append(f"  with twice the effort {twice.fraction:.4f} in {spent:.1f} s")
     planner = Planner(session, reach.mask)
     planner.enter()
     rng = np.random.default_rng(seed)
     times = []
     for _ in range(min(scenes, 100)):
         procedure = random_procedure(session, rng)
-        start = perf_counter()
+        start = process_time()
         session.check(procedure)
-        times.append(perf_counter() - start)
+        times.append(process_time() - start)
     middle, most = np.percentile(times, [50, 90]) * 1e3
     lines.append(f"  feasibility {middle:.1f} ms median, {most:.1f} ms nine in ten")
-    start = perf_counter()
+    start = process_time()
     found = feasibility_map(session, 1000)
     lines.append(
-        f"  map of {len(found.points)} in {perf_counter() - start:.2f} s, "
+        f"  map of {len(found.points)} in {process_time() - start:.2f} s, "
         f"{found.feasible.mean():.0%} feasible"
     )
     session = new_session(seed)
-    start = perf_counter()
+    start = process_time()
     Planner(session, reach.mask).run()
     lines.append(
         f"  plan of {session.fraction / reach.fraction:.4f} of the reachable part in "
-        f"{perf_counter() - start:.1f} s, {len(session.steps)} steps"
+        f"{process_time() - start:.1f} s, {len(session.steps)} steps"
     )
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lines.append(f"  memory {memory:.2f} GB")
