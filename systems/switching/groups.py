@@ -10,7 +10,7 @@ That distance falls from group to group, so that the walk ends.
 """
 
 from collections.abc import Sequence
-from math import atan2, hypot, inf, sqrt
+from math import atan2, hypot, inf, pi, sqrt
 
 from systems.switching.arcs import TWO_PI, Obstacle, time_to_enter
 from systems.switching.fields import involute_field
@@ -59,10 +59,9 @@ def way_round(
                 px - other[1], py - other[2], other[3] + clearance, side
             )
             # Hand over to the member that turns the way most from the group.
-            away = -side * (ex * fy - ey * fx)
-            if ex * fx + ey * fy < 0.0:
-                away = 2.0 - away if away > 0.0 else 0.0
-            if away > most:
+            cross = ex * fy - ey * fx
+            away = atan2(-side * cross, ex * fx + ey * fy) % TWO_PI
+            if most < away < 1.5 * pi:
                 most, following = away, other
         if following is None:
             break

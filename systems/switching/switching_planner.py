@@ -236,6 +236,8 @@ def _around_group(
     px, py = place
     gx, gy = g
     clearance = params.body_radius + params.margins[-1]
+    # Others stand near a group's boundary: they are passed with half the margin.
+    narrow = params.body_radius + 0.5 * params.margins[-1]
     limit = params.standing_speed**2
     standing = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] <= limit]
     moving = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] > limit]
@@ -258,10 +260,11 @@ def _around_group(
     if state.mode == UNREACHABLE:
         ex, ey = 0.0, 0.0
     enters = time_to_enter(px, py, speed * ex, speed * ey, moving, clearance)
-    if enters >= params.horizon:
+    hits = time_to_enter(px, py, speed * ex, speed * ey, standing, narrow)
+    if enters >= params.horizon and hits >= 1.0:
         return Plan(speed * ex, speed * ey, state)
     arcs = blocked_arcs(px, py, speed, moving, clearance, params.horizon)
-    arcs += blocked_arcs(px, py, speed, standing, clearance, 1.0)
+    arcs += blocked_arcs(px, py, speed, standing, narrow, 1.0)
     wanted = atan2(ey, ex)
     choice = nearest_free(
         arcs, wanted, speed, params.behind_bias, params.hysteresis, -1.0, 1.0
