@@ -109,7 +109,12 @@ def blocked_arcs(
         k = wx * nx + wy * ny
         if d - rho > horizon * (k + sqrt(k * k + vv - ww)):
             continue
-        along, out = involute_components(d, rho)
+        if ww == 0.0 and d < rho:
+            # A standing one only forbids to go deeper: between two of them both
+            # ways along must stay free.
+            along, out = 1.0, 0.0
+        else:
+            along, out = involute_components(d, rho)
         ox = out * nx
         oy = out * ny
         tx = -along * ny

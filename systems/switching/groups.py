@@ -15,8 +15,8 @@ from math import atan2, hypot, inf, pi, sqrt
 from systems.switching.arcs import TWO_PI, Obstacle, time_to_enter
 from systems.switching.fields import involute_field
 
-Follow = tuple[float, float, Obstacle]
-"""Unit direction x, y of the way round a group, and the member it follows."""
+Follow = tuple[float, float, Obstacle, float]
+"""Unit direction x, y of the way, the member it follows, its straight part [m]."""
 
 
 def way_round(
@@ -27,6 +27,7 @@ def way_round(
     standing: Sequence[Obstacle],
     clearance: float,
     look_ahead: float,
+    spare: float,
 ) -> Follow:
     """The direction that keeps a group on one side of the body.
 
@@ -38,35 +39,52 @@ def way_round(
         standing: All standing obstacles in sight.
         clearance: What a safety circle has beyond the disc's radius [m].
         look_ahead: Least length of the way that must be free of members [m].
+        spare: Gaps between safety circles up to this width are closed [m].
+
+    Returns:
+        The direction, the member that it follows and the length of the way
+        that is straight [m].
     """
-    ex = ey = 0.0
+    ex = ey = straight = 0.0
     for _ in range(len(standing) + 1):
         _, x, y, radius, _, _ = member
         rho = radius + clearance
         qx, qy = px - x, py - y
         ex, ey = involute_field(qx, qy, rho, side)
-        reach = max(sqrt(max(qx * qx + qy * qy - rho * rho, 0.0)), look_ahead)
+        straight = sqrt(max(qx * qx + qy * qy - rho * rho, 0.0))
+        reach = max(straight, look_ahead)
         following = None
         most = 1e-6
         for other in standing:
-            touch = rho + other[3] + clearance
+            touch = rho + other[3] + clearance + spare
             ax, ay = other[1] - x, other[2] - y
             if ax * ax + ay * ay >= touch * touch or other is member:
                 continue
-            if time_to_enter(px, py, ex, ey, (other,), clearance) > reach:
+            if time_to_enter(px, py, ex, ey, (other,), clearance + spare) > reach:
                 continue
-            fx, fy = involute_field(
-                px - other[1], py - other[2], other[3] + clearance, side
-            )
             # Hand over to the member that turns the way most from the group.
-            cross = ex * fy - ey * fx
-            away = atan2(-side * cross, ex * fx + ey * fy) % TWO_PI
-            if most < away < 1.5 * pi:
+            away, _, _ = _turn(px, py, ex, ey, other, clearance + spare, side)
+            if away > most:
                 most, following = away, other
         if following is None:
             break
         member = following
-    return ex, ey, member
+    return ex, ey, member, straight
+
+
+def _turn(
+    px: float,
+    py: float,
+    ex: float,
+    ey: float,
+    other: Obstacle,
+    clearance: float,
+    side: float,
+) -> tuple[float, float, float]:
+    """How far [rad] the way past another disc turns from the way e, and that way."""
+    fx, fy = involute_field(px - other[1], py - other[2], other[3] + clearance, side)
+    away = atan2(-side * (ex * fy - ey * fx), ex * fx + ey * fy) % TWO_PI
+    return (away if away < 1.5 * pi else 0.0), fx, fy
 
 
 def free_range(
@@ -120,14 +138,16 @@ def shorter_side(
     standing: Sequence[Obstacle],
     clearance: float,
     look_ahead: float,
+    spare: float,
 ) -> float:
     """The side on which the way round a group turns least from the goal."""
     turns = []
     for side in (1.0, -1.0):
-        ex, ey, _ = way_round(
-            px, py, member, side, standing, clearance, look_ahead
+        ex, ey, _, _ = way_round(
+            px, py, member, side, standing, clearance, look_ahead, spare
         )
-        turns.append(atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI)
+        turn = atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI
+        turns.append(turn if turn < 1.5 * pi else 0.0)
     return 1.0 if turns[0] <= turns[1] else -1.0
 
 

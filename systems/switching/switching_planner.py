@@ -31,8 +31,9 @@ from systems.switching.groups import (
     way_round,
 )
 
-ATTRACTIVE, BYPASS, GROUP, YIELD, UNREACHABLE = range(5)
-MODES = ("attractive", "bypass", "group", "yield", "unreachable")
+ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
+SP=.2; F0=.3; AA=.4; NA=.5; A0=.3; A1=1.; H2=1.
+MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
 """Names of the planner's states, by number."""
 
 
@@ -131,6 +132,24 @@ def plan(
     goal: tuple[float, float],
     obstacles: Sequence[Obstacle],
 ) -> Plan:
+    vx, vy, state = plan_(params, state, place, goal, obstacles)
+    v=hypot(vx,vy)
+    if v>1e-6:
+        limit = params.standing_speed**2
+        standing = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] <= limit]
+        L=time_to_enter(*place, vx/v, vy/v, standing, params.body_radius+NA*params.margins[-1])
+        m=max((2*AA*L)**.5,.1*params.speed)
+        if m<v: vx*=m/v; vy*=m/v
+    return Plan(vx,vy,state)
+
+
+def plan_(
+    params: SwitchingParams,
+    state: SwitchingState,
+    place: tuple[float, float],
+    goal: tuple[float, float],
+    obstacles: Sequence[Obstacle],
+) -> Plan:
     """One step of the switching planner.
 
     Args:
@@ -150,6 +169,10 @@ def plan(
     speed = min(params.speed, params.approach_gain * distance)
     if state.mode == GROUP or state.mode == UNREACHABLE:
         return _around_group(params, state, place, (gx, gy), distance, obstacles)
+    if state.mode == LEAVE:
+        step = _leave(params, state, place, (gx, gy), distance, obstacles)
+        if step is not None:
+            return step
     clearance = params.body_radius + params.margins[0]
     enters = time_to_enter(
         px, py, params.speed * gx, params.speed * gy, obstacles, clearance
@@ -174,13 +197,15 @@ def _bypass(
     standing = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] <= limit]
     moving = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] > limit]
     wanted = atan2(gy, gx)
-    rungs = [(margin, 1.0) for margin in params.margins]
-    rungs += [(params.margins[-1], fraction) for fraction in params.slower]
+    rungs = [(margin, 1.0, 1.0) for margin in params.margins]
+    rungs += [(params.margins[-1], 1.0, H2)]
+    rungs += [(params.margins[-1], fraction, H2) for fraction in params.slower]
     trapped = False
-    for margin, fraction in rungs:
+    for margin, fraction, near_sight in rungs:
         speed = fraction * params.speed
         clearance = params.body_radius + margin
-        close = min(params.standing_horizon * params.speed, distance)
+        if margin==params.margins[-1]: clearance+=0.5*SP*margin
+        close = min(near_sight * params.standing_horizon * params.speed, distance)
         arcs = blocked_arcs(px, py, speed, standing, clearance, close / speed)
         if arcs:
             choice = nearest_free(arcs, wanted, speed, 0.0, params.hysteresis, state.track, state.side)
@@ -211,17 +236,43 @@ def _bypass(
             new = SwitchingState(mode, track, side)
             return Plan(speed * cos(heading), speed * sin(heading), new)
     if trapped:
-        clearance = params.body_radius + params.margins[-1]
+        clearance = params.body_radius + params.margins[-1]*(1+.5*SP)
         member = first_on_ray(px, py, gx, gy, standing, clearance)
         if member is not None:
+            clearance = params.body_radius + params.margins[-1]
             look_ahead = params.body_radius
             side = shorter_side(
-                px, py, gx, gy, member, standing, clearance, look_ahead
+                px, py, gx, gy, member, standing, clearance, look_ahead, SP*params.margins[-1]
             )
-            free = free_range(px, py, gx, gy, standing, clearance, params.vision)
+            free = free_range(px, py, gx, gy, standing, clearance + 0.5*SP*params.margins[-1], params.vision)
             new = SwitchingState(GROUP, member[0], side, distance - free)
             return _around_group(params, new, place, g, distance, obstacles)
     return _least_bad(params, state, place, wanted, obstacles)
+
+
+def _leave(
+    params: SwitchingParams,
+    state: SwitchingState,
+    place: tuple[float, float],
+    g: tuple[float, float],
+    distance: float,
+    obstacles: Sequence[Obstacle],
+) -> Plan | None:
+    """Goes straight to the goal until nearer to it than any place before."""
+    px, py = place
+    gx, gy = g
+    if distance <= state.hit_distance + 0.05:
+        return None
+    clearance = params.body_radius + params.margins[-1]
+    speed = min(params.speed, params.approach_gain * distance)
+    limit = params.standing_speed**2
+    standing = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] <= limit]
+    moving = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] > limit]
+    if time_to_enter(px, py, gx, gy, standing, clearance+ 0.5*SP*params.margins[-1]) < params.body_radius:
+        return None
+    if time_to_enter(px, py, speed * gx, speed * gy, moving, clearance) < params.horizon:
+        return None
+    return Plan(speed * gx, speed * gy, state)
 
 
 def _around_group(
@@ -241,18 +292,18 @@ def _around_group(
     limit = params.standing_speed**2
     standing = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] <= limit]
     moving = [o for o in obstacles if o[4] * o[4] + o[5] * o[5] > limit]
-    free = free_range(px, py, gx, gy, standing, clearance, params.vision)
+    free = free_range(px, py, gx, gy, standing, clearance + 0.5*SP*params.margins[-1], params.vision)
     member = next((o for o in standing if o[0] == state.track), None)
     gone = member is None
-    leaves = free > min(distance, params.body_radius) and (
+    leaves = free > min(distance, F0) and (
         distance - free < state.hit_distance - params.leave_gain
     )
     if gone or leaves:
-        fresh = SwitchingState()
+        fresh = SwitchingState() if gone else SwitchingState(LEAVE, -1.0, 1.0, distance - free)
         return plan(params, fresh, place, (px + distance * gx, py + distance * gy), obstacles)
     look_ahead = params.body_radius
-    ex, ey, member = way_round(
-        px, py, member, state.side, standing, clearance, look_ahead
+    ex, ey, member, straight = way_round(
+        px, py, member, state.side, standing, clearance, look_ahead, SP*params.margins[-1]
     )
     state = state._replace(track=member[0])
     state = _count_laps(state, px, py, member, clearance)
@@ -261,10 +312,11 @@ def _around_group(
         ex, ey = 0.0, 0.0
     enters = time_to_enter(px, py, speed * ex, speed * ey, moving, clearance)
     hits = time_to_enter(px, py, speed * ex, speed * ey, standing, narrow)
-    if enters >= params.horizon and hits >= 1.0:
+    ahead = min(max(straight / speed, A0), A1)
+    if enters >= params.horizon and hits >= ahead:
         return Plan(speed * ex, speed * ey, state)
     arcs = blocked_arcs(px, py, speed, moving, clearance, params.horizon)
-    arcs += blocked_arcs(px, py, speed, standing, narrow, 1.0)
+    arcs += blocked_arcs(px, py, speed, standing, narrow, ahead)
     wanted = atan2(ey, ex)
     choice = nearest_free(
         arcs, wanted, speed, params.behind_bias, params.hysteresis, -1.0, 1.0

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, sin
 from time import perf_counter
 
+from systems.switching.unicycle_control import UnicycleControlParams, heading_law
 from tests.benchmarks.scenes import Frame, Robot, Scene
 
 Seen = list[tuple[float, float, float, float, float, float]]
@@ -49,10 +50,10 @@ def unicycle(
     """One step of the heading law on a unicycle with limited accelerations."""
     x, y, theta = pose
     speed, rate = speeds
-    size = hypot(*wanted)
-    error = (atan2(wanted[1], wanted[0]) - theta + pi) % (2.0 * pi) - pi if size else 0.0
-    target = min(size, robot.speed) * max(0.0, cos(error))
-    turn = min(max(4.0 * error, -robot.turn_rate), robot.turn_rate)
+    law = UnicycleControlParams(
+        4.0, robot.speed, robot.turn_rate, robot.turn_acceleration
+    )
+    target, turn = heading_law(law, theta, *wanted)
     dv = robot.acceleration * dt
     dw = robot.turn_acceleration * dt
     speed = min(max(target, speed - dv), speed + dv)

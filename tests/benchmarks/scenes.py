@@ -26,7 +26,7 @@ class Robot:
     speed: float = 0.5  # m/s
     turn_rate: float = 1.8  # rad/s; zero makes it holonomic
     acceleration: float = 1.0  # m/s^2
-    turn_acceleration: float = 6.0  # rad/s^2
+    turn_acceleration: float = 3.5  # rad/s^2
     vision: float = 3.0  # m
     reach: float = 0.1  # m, distance at which the goal counts as reached
 

@@ -1,0 +1,60 @@
+"""Action: from the planner's velocity to a unicycle's speed and turn rate.
+
+The thesis names the control law without giving it. This one turns the heading
+into the velocity's direction, no faster than it can still stop turning, and
+drives with the part of the speed that points there.
+"""
+
+from dataclasses import dataclass
+from math import atan2, cos, hypot, isfinite, pi, sqrt
+
+TWO_PI = 2.0 * pi
+
+
+@dataclass
+class UnicycleControlParams:
+    """Parameters of the control law."""
+
+    # Turn rate per heading error [1/s].
+    gain: float = 4.0
+    # Greatest speed [m/s].
+    speed: float = 0.5
+    # Greatest turn rate [rad/s].
+    turn_rate: float = 1.8
+    # Greatest turn acceleration [rad/s^2].
+    turn_acceleration: float = 3.2
+
+    def check(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: If one is not positive and finite.
+        """
+        for name in ("gain", "speed", "turn_rate", "turn_acceleration"):
+            value = getattr(self, name)
+            if not (value > 0.0 and isfinite(value)):
+                raise ValueError(f"{name}={value} must be positive and finite")
+
+
+def heading_law(
+    params: UnicycleControlParams, theta: float, vx: float, vy: float
+) -> tuple[float, float]:
+    """Speed [m/s] and turn rate [rad/s] towards a velocity.
+
+    Args:
+        params: Parameters.
+        theta: Heading of the body [rad].
+        vx: Wanted velocity, x [m/s].
+        vy: Wanted velocity, y [m/s].
+    """
+    size = hypot(vx, vy)
+    if size == 0.0:
+        return 0.0, 0.0
+    error = (atan2(vy, vx) - theta + pi) % TWO_PI - pi
+    turn = min(
+        params.gain * abs(error),
+        sqrt(2.0 * params.turn_acceleration * abs(error)),
+        params.turn_rate,
+    )
+    speed = min(size, params.speed) * max(0.0, cos(error))
+    return speed, turn if error >= 0.0 else -turn
