@@ -14,7 +14,7 @@ thesis leaves open (senses, moving obstacles, groups) is worked out here.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, cos, hypot, isfinite, pi, sin
+from math import atan2, cos, hypot, inf, isfinite, pi, sin
 from typing import NamedTuple
 
 from systems.switching.arcs import (
@@ -32,7 +32,7 @@ from systems.switching.groups import (
 )
 
 ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
-SP=.2; F0=.3; AA=.4; NA=.5; A0=.3; A1=1.; H2=1.
+SP=.2; F0=.2; AA=.4; NA=.5; A0=.3; A1=1.; H2=1.
 MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
 """Names of the planner's states, by number."""
 
@@ -108,7 +108,7 @@ class SwitchingState(NamedTuple):
     side: float = 1.0
     # How near to the goal the way straight to it leads before it meets the
     # group [m].
-    hit_distance: float = 0.0
+    hit_distance: float = inf
     # Where the body first touched the group's boundary [m].
     hit_x: float = 0.0
     hit_y: float = 0.0
@@ -178,7 +178,7 @@ def plan_(
         px, py, params.speed * gx, params.speed * gy, obstacles, clearance
     )
     if enters >= min(params.horizon, distance / params.speed):
-        return Plan(speed * gx, speed * gy, SwitchingState())
+        return Plan(speed * gx, speed * gy, SwitchingState(hit_distance=state.hit_distance))
     return _bypass(params, state, place, (gx, gy), distance, obstacles)
 
 
@@ -218,7 +218,7 @@ def _bypass(
         if enters >= min(params.horizon, distance / speed):
             slow = min(speed, params.approach_gain * distance)
             mode = ATTRACTIVE if fraction == 1.0 else YIELD
-            return Plan(slow * gx, slow * gy, SwitchingState(mode))
+            return Plan(slow * gx, slow * gy, SwitchingState(mode, hit_distance=state.hit_distance))
         arcs += blocked_arcs(px, py, speed, moving, clearance, params.horizon)
         choice = nearest_free(
             arcs,
@@ -233,7 +233,7 @@ def _bypass(
             _, heading, _, edge, side = choice
             mode = BYPASS if fraction == 1.0 else YIELD
             track = edge[0] if edge is not None else -1.0
-            new = SwitchingState(mode, track, side)
+            new = SwitchingState(mode, track, side, state.hit_distance)
             return Plan(speed * cos(heading), speed * sin(heading), new)
     if trapped:
         clearance = params.body_radius + params.margins[-1]*(1+.5*SP)
@@ -245,7 +245,7 @@ def _bypass(
                 px, py, gx, gy, member, standing, clearance, look_ahead, SP*params.margins[-1]
             )
             free = free_range(px, py, gx, gy, standing, clearance + 0.5*SP*params.margins[-1], params.vision)
-            new = SwitchingState(GROUP, member[0], side, distance - free)
+            new = SwitchingState(GROUP, member[0], side, min(distance - free, state.hit_distance))
             return _around_group(params, new, place, g, distance, obstacles)
     return _least_bad(params, state, place, wanted, obstacles)
 
@@ -299,7 +299,7 @@ def _around_group(
         distance - free < state.hit_distance - params.leave_gain
     )
     if gone or leaves:
-        fresh = SwitchingState() if gone else SwitchingState(LEAVE, -1.0, 1.0, distance - free)
+        fresh = SwitchingState(ATTRACTIVE if gone else LEAVE, -1.0, 1.0, state.hit_distance if gone else distance - free)
         return plan(params, fresh, place, (px + distance * gx, py + distance * gy), obstacles)
     look_ahead = params.body_radius
     ex, ey, member, straight = way_round(
