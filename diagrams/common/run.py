@@ -1,0 +1,236 @@
+"""Running a scenario: build, advance, log; then measure, plot and replay."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import gc
+import json
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from pydrake.common import RandomGenerator
+from pydrake.systems.analysis import (
+    ApplySimulatorConfig,
+    Simulator,
+    SimulatorConfig,
+)
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
+from diagrams.common import metrics, replay
+from diagrams.common.plots import save_figure
+from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
+from diagrams.common.study import Study, build, get_study
+from systems.common.stopwatch import STOPWATCH
+
+INTEGRATOR = SimulatorConfig(
+    integration_scheme="cenic",
+    accuracy=1e-3,
+    max_step_size=0.01,
+)
+"""All plants are continuous and stepped by CENIC."""
+
+
+@dataclass
+class Run:
+    """A run of a scenario: what was simulated and what was logged.
+
+    Attributes:
+        scenario: What ran.
+        study: The system that ran it.
+        diagram: The root diagram; the study's own is its subsystem "station".
+        signals: Column name to samples; "time" [s] is the common clock.
+        wall_time: Wall seconds of the advance alone.
+        simulated: Simulated seconds reached.
+        instants: Wall seconds of all blocks, one for every whole control instant.
+        updates: Median wall seconds of one update, by block.
+        error: Why the run ended early, or "".
+        metrics: The figures, once measured.
+    """
+
+    scenario: Any
+    study: Study
+    diagram: Any
+    signals: dict[str, np.ndarray] = field(default_factory=dict)
+    wall_time: float = 0.0
+    simulated: float = 0.0
+    instants: list[float] = field(default_factory=list)
+    updates: dict[str, float] = field(default_factory=dict)
+    error: str = ""
+    metrics: dict[str, Any] = field(default_factory=dict)
+
+    def matrix(self, name: str) -> np.ndarray:
+        """All columns of one port, shape (samples, columns)."""
+        return np.column_stack([self.signals[c] for c in columns(self.study, name)])
+
+
+def columns(study: Study, port: str) -> list[str]:
+    """Names of a port's columns in the log."""
+    parts = study.signals[port]
+    return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
+
+
+def simulate(
+    scenario: Any,
+    meshcat: Any = None,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Run:
+    """Runs a scenario and returns its log; raises nothing that a run can survive.
+
+    An error or an interruption in mid-run ends it; what was logged until then
+    is kept and `Run.error` says why.
+
+    Args:
+        scenario: A study's scenario.
+        meshcat: Records into this Meshcat if given. Frames are drawn between the
+            timed advances, so that they do not count as simulation time.
+        progress: Called with the simulated time [s] after every frame.
+
+    Raises:
+        ScenarioError: If the scenario cannot run.
+    """
+    check_scenario(scenario)
+    return simulate_diagram(scenario, build(scenario), meshcat, progress)
+
+
+def simulate_diagram(
+    scenario: Any,
+    diagram: Any,
+    meshcat: Any = None,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Run:
+    """Runs a diagram of one's own making, for example with swapped blocks.
+
+    Args:
+        scenario: The scenario that it was made for.
+        diagram: Exports the ports that the scenario's study logs.
+        meshcat: As for `simulate`.
+        progress: As for `simulate`.
+    """
+    study = get_study(scenario.system)
+    builder = DiagramBuilder()
+    station = builder.AddNamedSystem("station", diagram)
+    sinks = add_logs(builder, station, study)
+    recorder = replay.add_recorder(builder, station, meshcat, study)
+    root = builder.Build()
+    simulator = Simulator(root)
+    ApplySimulatorConfig(INTEGRATOR, simulator)
+    context = simulator.get_mutable_context()
+    root.SetRandomContext(context, RandomGenerator(scenario.seed))
+    run = Run(scenario, study, root)
+    STOPWATCH.reset()
+    gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
+    try:
+        advance(run, simulator, recorder, progress)
+    except KeyboardInterrupt:
+        run.error = "interrupted"
+    except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
+        run.error = f"{type(error).__name__}: {error}"
+    finally:
+        gc.enable()
+    run.simulated = context.get_time()
+    run.signals = read_logs(sinks, study, context)
+    run.instants = STOPWATCH.whole_instants(study.controller)
+    run.updates = STOPWATCH.per_block()
+    if len(run.signals["time"]) > 1:
+        run.metrics = metrics.common(run) | study.measure(run)
+    recorder.finish(run)
+    return run
+
+
+def advance(
+    run: Run,
+    simulator: Any,
+    recorder: replay.Recorder,
+    progress: Callable[[float], None],
+) -> None:
+    """Steps the simulator from frame to frame; only the steps are timed."""
+    duration, rate = run.scenario.duration, run.study.frame_rate
+    simulator.Initialize()
+    recorder.draw(simulator.get_context())
+    time, frame = 0.0, 0
+    while time < duration:
+        frame += 1
+        time = min(frame / rate, duration)
+        start = perf_counter()
+        simulator.AdvanceTo(time)
+        run.wall_time += perf_counter() - start
+        recorder.draw(simulator.get_context())
+        progress(time)
+
+
+def add_logs(builder: Any, station: Any, study: Study) -> dict[str, Any]:
+    """Logs the study's signals: port name to log sink."""
+    sinks = {}
+    for port in study.signals:
+        output = station.GetOutputPort(port)
+        sinks[port] = LogVectorOutput(output, builder, study.log_period)
+        sinks[port].set_name(f"log({port})")
+    return sinks
+
+
+def read_logs(
+    sinks: dict[str, Any], study: Study, context: Any
+) -> dict[str, np.ndarray]:
+    """All columns of the log, of one length; "time" is the first."""
+    signals: dict[str, np.ndarray] = {}
+    for port, sink in sinks.items():
+        log = sink.FindLog(context)
+        signals.setdefault("time", log.sample_times().copy())
+        for name, row in zip(columns(study, port), log.data(), strict=True):
+            signals[name] = row.copy()
+    shortest = min(len(column) for column in signals.values())
+    return {name: column[:shortest] for name, column in signals.items()}
+
+
+def prepare_folder(out: Path) -> None:
+    """Makes the output folder, or raises a ScenarioError if it cannot be written."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / ".writable"
+        probe.write_text("")
+        probe.unlink()
+    except OSError as error:
+        raise ScenarioError(
+            f"cannot write to the output folder {str(out)!r}: {error.strerror}"
+        ) from error
+
+
+def save_signals(run: Run, path: Path) -> None:
+    """Writes the log as CSV, one column a signal: `pandas.read_csv(path)`."""
+    names = list(run.signals)
+    table = np.column_stack([run.signals[name] for name in names])
+    np.savetxt(
+        path, table, fmt="%.9g", delimiter=",", header=",".join(names), comments=""
+    )
+
+
+def run_scenario(
+    scenario: Any,
+    out: Path,
+    with_replay: bool = True,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Run:
+    """Runs a scenario and writes all its results into a folder.
+
+    Writes `scenario.yaml`, `signals.csv`, `metrics.json`, the plots as PNG and
+    `replay.html`, in this order, so that nothing computed is lost if a later
+    one fails.
+
+    Raises:
+        ScenarioError: If the scenario cannot run or the folder not be written.
+    """
+    prepare_folder(out)
+    check_scenario(scenario)
+    meshcat = replay.start_meshcat() if with_replay else None
+    save_scenario(scenario, out)
+    run = simulate(scenario, meshcat, progress)
+    save_signals(run, out / "signals.csv")
+    (out / "metrics.json").write_text(json.dumps(run.metrics, indent=2) + "\n")
+    if run.metrics:
+        for name, figure in run.study.plots(run).items():
+            save_figure(figure, out / f"{name}.png")
+    if meshcat is not None:
+        (out / "replay.html").write_text(meshcat.StaticHtml())
+    return run
