@@ -122,7 +122,12 @@ def plan(
     vx, vy, state = _step(params, state, sight)
     if standing:
         vx, vy = _slow_down(params, sight, vx, vy)
-    return Plan(vx, vy, state, fastest >= params.speed**2)
+    retreat = False
+    if moving:
+        clearance = params.body_radius + params.margins[0]
+        meets = time_to_enter(px, py, 0.0, 0.0, moving, clearance)
+        retreat = meets < params.retreat_time
+    return Plan(vx, vy, state, fastest >= params.speed**2, retreat)
 
 
 def _step(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:

@@ -44,6 +44,8 @@ class SwitchingParams:
     leave_gain: float = 0.05
     # Deceleration that limits the speed towards standing obstacles [m/s^2].
     deceleration: float = 0.4
+    # The body may retreat backwards from obstacles that come within this time [s].
+    retreat_time: float = 2.0
     # Speed per distance to the goal [1/s], near the goal.
     approach_gain: float = 2.0
 
@@ -60,7 +62,7 @@ class SwitchingParams:
             if not (value > 0.0 and isfinite(value)):
                 raise ValueError(f"planner: {name}={value} must be positive and finite")
         others = ("response", "standing_speed", "hysteresis", "behind_bias")
-        others += ("closed_gap", "leave_gain")
+        others += ("closed_gap", "leave_gain", "retreat_time")
         for name in others:
             value = getattr(self, name)
             if not (value >= 0.0 and isfinite(value)):
@@ -117,3 +119,6 @@ class Plan(NamedTuple):
     # Whether an obstacle in sight is at least as fast as the body. Then no method
     # can promise anything; the planner goes on doing its best.
     outrun: bool = False
+    # Whether an obstacle will meet the body soon if it stays where it is: time to
+    # get away at once, backwards if need be.
+    retreat: bool = False

@@ -22,7 +22,9 @@ class UnicycleControlParams:
     # Greatest turn rate [rad/s].
     turn_rate: float = 1.8
     # Greatest turn acceleration [rad/s^2].
-    turn_acceleration: float = 3.2
+    turn_acceleration: float = 3.5
+    # Heading error beyond which it drives backwards [rad].
+    backwards: float = 1.8
 
     def check(self) -> None:
         """Checks the values.
@@ -37,7 +39,11 @@ class UnicycleControlParams:
 
 
 def heading_law(
-    params: UnicycleControlParams, theta: float, vx: float, vy: float
+    params: UnicycleControlParams,
+    theta: float,
+    vx: float,
+    vy: float,
+    retreat: bool = False,
 ) -> tuple[float, float]:
     """Speed [m/s] and turn rate [rad/s] towards a velocity.
 
@@ -46,15 +52,21 @@ def heading_law(
         theta: Heading of the body [rad].
         vx: Wanted velocity, x [m/s].
         vy: Wanted velocity, y [m/s].
+        retreat: Whether it may drive backwards, to get away without turning.
     """
     size = hypot(vx, vy)
     if size == 0.0:
         return 0.0, 0.0
     error = (atan2(vy, vx) - theta + pi) % TWO_PI - pi
+    backwards = retreat and abs(error) > params.backwards
+    if backwards:
+        error += pi if error < 0.0 else -pi
     turn = min(
         params.gain * abs(error),
         sqrt(2.0 * params.turn_acceleration * abs(error)),
         params.turn_rate,
     )
     speed = min(size, params.speed) * max(0.0, cos(error))
+    if backwards:
+        speed = -speed
     return speed, turn if error >= 0.0 else -turn

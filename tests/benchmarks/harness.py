@@ -11,8 +11,8 @@ from tests.benchmarks.scenes import Frame, Robot, Scene
 Seen = list[tuple[float, float, float, float, float, float]]
 """Track identity, x, y, radius, v_x, v_y of the obstacles in sight."""
 
-Step = Callable[[float, float, float, float, float, Seen], tuple[float, float]]
-"""(x, y, heading, v_x, v_y, obstacles in sight) -> velocity (v_x, v_y)."""
+Step = Callable[[float, float, float, float, float, Seen], tuple[float, float, bool]]
+"""(x, y, heading, v_x, v_y, obstacles in sight) -> velocity (v_x, v_y), retreat."""
 
 Planner = Callable[[Scene], Step]
 """Makes a fresh planner for a scene."""
@@ -44,7 +44,7 @@ def unicycle(
     robot: Robot,
     pose: tuple[float, float, float],
     speeds: tuple[float, float],
-    wanted: tuple[float, float],
+    wanted: tuple[float, float, bool],
     dt: float,
 ) -> tuple[tuple[float, float, float], tuple[float, float]]:
     """One step of the heading law on a unicycle with limited accelerations."""
@@ -92,7 +92,7 @@ def run(scene: Scene, planner: Planner) -> Result:
         wanted = step(x, y, theta, vx, vy, seen)
         walls.append(perf_counter() - start)
         if robot.holonomic:
-            size = hypot(*wanted)
+            size = hypot(wanted[0], wanted[1])
             scale = min(1.0, robot.speed / size) if size else 0.0
             vx, vy = wanted[0] * scale, wanted[1] * scale
             nx, ny = x + dt * vx, y + dt * vy
