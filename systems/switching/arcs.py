@@ -189,6 +189,8 @@ def nearest_free(
     hysteresis: float,
     track: float,
     side: float,
+    commitment: float = 0.0,
+    last: float = 0.0,
 ) -> Choice | None:
     """The heading in no arc that is nearest to the wanted one.
 
@@ -206,6 +208,8 @@ def nearest_free(
         hysteresis: [rad].
         track: Obstacle of the last choice.
         side: Side of the last choice.
+        commitment: Cost of turning away from the last heading [rad per rad].
+        last: Heading of the last choice [rad].
 
     Returns:
         The choice, or None if every heading is blocked.
@@ -238,6 +242,7 @@ def nearest_free(
             cost -= behind_bias * sign * across / speed
             if edge[0] == track and sign == side:
                 cost -= hysteresis
+            cost += commitment * abs((heading - last + pi) % TWO_PI - pi)
         if best is None or cost < best[0]:
             best = (cost, heading, turn, edge, sign)
     return best

@@ -159,7 +159,8 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
     rungs += [(params.margins[-1], f * params.speed) for f in params.slower]
     close = min(params.standing_horizon * params.speed, distance)
     trapped = False
-    memory = (params.hysteresis, state.track, state.side)
+    commitment = params.commitment if state.mode in (BYPASS, YIELD) else 0.0
+    memory = (params.hysteresis, state.track, state.side, commitment, state.heading)
     for margin, speed in rungs:
         clearance = params.body_radius + margin
         if margin == params.margins[-1]:
@@ -182,7 +183,7 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
             _, heading, _, edge, side = choice
             mode = BYPASS if full else YIELD
             track = edge[0] if edge is not None else -1.0
-            new = SwitchingState(mode, track, side, state.best)
+            new = SwitchingState(mode, track, side, state.best, heading=heading)
             return speed * cos(heading), speed * sin(heading), new
     if trapped:
         met = _meet_group(params, state, sight)

@@ -34,6 +34,8 @@ class SwitchingParams:
     standing_speed: float = 0.05
     # Advantage of the obstacle and side chosen last [rad].
     hysteresis: float = 0.3
+    # Cost of turning away from the last bypass [rad per rad].
+    commitment: float = 0.6
     # Advantage of passing behind an obstacle of the body's own speed [rad].
     behind_bias: float = 0.35
     # Standing obstacles that turn the body by more than this [rad] are a trap.
@@ -55,14 +57,18 @@ class SwitchingParams:
         Raises:
             ValueError: If one is out of range; tells the range.
         """
-        positive = ("body_radius", "speed", "vision", "horizon", "standing_horizon")
-        positive += ("trap_turn", "deceleration", "approach_gain")
+        positive = [
+            *("body_radius", "speed", "vision", "horizon", "standing_horizon"),
+            *("trap_turn", "deceleration", "approach_gain"),
+        ]
         for name in positive:
             value = getattr(self, name)
             if not (value > 0.0 and isfinite(value)):
                 raise ValueError(f"planner: {name}={value} must be positive and finite")
-        others = ("response", "standing_speed", "hysteresis", "behind_bias")
-        others += ("closed_gap", "leave_gain", "retreat_time")
+        others = [
+            *("response", "standing_speed", "hysteresis", "commitment", "behind_bias"),
+            *("closed_gap", "leave_gain", "retreat_time"),
+        ]
         for name in others:
             value = getattr(self, name)
             if not (value >= 0.0 and isfinite(value)):
@@ -89,7 +95,7 @@ class SwitchingParams:
 
 
 class SwitchingState(NamedTuple):
-    """What the planner remembers from step to step: eight numbers."""
+    """What the planner remembers from step to step: nine numbers."""
 
     # One of MODES.
     mode: float = 0.0
@@ -106,6 +112,8 @@ class SwitchingState(NamedTuple):
     # -1 before that, 0 near that place, 1 away from it; how often it came back.
     away: float = -1.0
     laps: float = 0.0
+    # Heading of the last bypass [rad].
+    heading: float = 0.0
 
 
 class Plan(NamedTuple):

@@ -5,8 +5,13 @@ into the velocity's direction, no faster than it can still stop turning, and
 drives with the part of the speed that points there.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, hypot, isfinite, pi, sqrt
+from typing import Any
+
+from systems.common.block import Block
+from systems.switching.signals import ROBOT_EXAMPLE
 
 TWO_PI = 2.0 * pi
 
@@ -70,3 +75,36 @@ def heading_law(
     if backwards:
         speed = -speed
     return speed, turn if error >= 0.0 else -turn
+
+
+class UnicycleControl(Block):
+    """The control law of the robot, section 3.1.2 of the thesis.
+
+    Port ``robot`` accepts the body's x, y, heading, speed and turn rate (5).
+    Port ``v_R`` accepts the velocity to take in m/s, world frame (2).
+    Port ``mode`` accepts the planner's state; its fourth number tells whether the
+    body may drive backwards (5).
+    Port ``command`` emits speed in m/s and turn rate in rad/s (2).
+    """
+
+    def __init__(self, params: UnicycleControlParams | None = None) -> None:
+        """Makes the block.
+
+        Raises:
+            ValueError: If a parameter is out of range.
+        """
+        super().__init__()
+        self.params = params or UnicycleControlParams()
+        self.params.check()
+        self._robot = self.vector_in("robot", ROBOT_EXAMPLE)
+        self._v_R = self.vector_in("v_R", [0.4, 0.3])
+        self._mode = self.vector_in("mode", [0.0, -1.0, 1.0, 0.0, 0.0])
+        ports = (self._robot, self._v_R, self._mode)
+        inputs = {port.ticket() for port in ports}
+        self.vector_out("command", 2, self._calc_command, inputs)
+
+    def _calc_command(self, context: Any) -> Sequence[float]:
+        theta = self._robot.Eval(context).tolist()[2]
+        vx, vy = self._v_R.Eval(context).tolist()
+        retreat = self._mode.Eval(context).tolist()[3] > 0.5
+        return heading_law(self.params, theta, vx, vy, retreat)

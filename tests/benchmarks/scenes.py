@@ -7,6 +7,7 @@ computed beforehand. Every suite is a function of a seed.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
 from math import cos, hypot, pi, sin
 
 import numpy as np
@@ -110,9 +111,7 @@ def three_moving(seed: int, count: int = 100) -> list[Scene]:
             discs = [d for d in discs if hypot(d[0], d[1]) >= 1.0]
             while len(discs) < 3:
                 discs.append((5.0, 3.0 + len(discs), 0.3, 0.0, -0.3))
-        scenes.append(
-            Scene(f"three {k}", (0.0, 0.0), (10.0, 0.0), steady(discs, 0.05))
-        )
+        scenes.append(Scene(f"three {k}", (0.0, 0.0), (10.0, 0.0), steady(discs, 0.05)))
     return scenes
 
 
@@ -150,7 +149,9 @@ def hopeless(scene: Scene, duration: float = 3.0) -> bool:
             x = scene.start[0] + k * scene.dt * u
             y = scene.start[1] + k * scene.dt * v
             reach = scene.robot.radius
-            if any(hypot(a - x, b - y) < r + reach for a, b, r, _, _ in scene.frames(k)):
+            if any(
+                hypot(a - x, b - y) < r + reach for a, b, r, _, _ in scene.frames(k)
+            ):
                 break
         else:
             return False
@@ -206,7 +207,9 @@ def _static(seed: int, n: int, count: int) -> list[Scene]:
     while len(scenes) < count:
         x, y = rng.uniform(1.0, 7.0, n), rng.uniform(-2.5, 2.5, n)
         r = rng.uniform(0.2, 0.5, n)
-        discs = [(float(a), float(b), float(c)) for a, b, c in zip(x, y, r, strict=True)]
+        discs = [
+            (float(a), float(b), float(c)) for a, b, c in zip(x, y, r, strict=True)
+        ]
         if any(min(hypot(a, b), hypot(a - 8.0, b)) < c + 0.5 for a, b, c in discs):
             continue
         if solvable(discs, start, goal, TURTLEBOT.radius + 0.12):
@@ -230,7 +233,7 @@ def static_20(seed: int, count: int = 100) -> list[Scene]:
 def wall(points: list[tuple[float, float]], radius: float = 0.2):
     """Standing discs that touch each other along a chain of straight lines."""
     discs = []
-    for (ax, ay), (bx, by) in zip(points[:-1], points[1:], strict=True):
+    for (ax, ay), (bx, by) in pairwise(points):
         n = max(int(round(hypot(bx - ax, by - ay) / (2.0 * radius))), 1)
         for k in range(n + 1):
             s = k / n
@@ -281,20 +284,28 @@ def _humans(case: int, n: int) -> list[list[float]]:
     return people[1:]
 
 
-@cache
-def _crowd_frames(case: int, n: int) -> list[Frame]:
-    people = _humans(case, n)
-    goals = [(p[2], p[3]) for p in people]
-    agents = [(p[0], p[1], 0.0, 0.0, 0.3) for p in people]
-    frames: list[Frame] = []
-    for _ in range(100):
-        frames.append([(x, y, r, u, v) for x, y, u, v, r in agents])
-        moves = orca_towards(agents, goals, 1.0, 5.0, 0.25)
-        agents = [
-            (x + 0.25 * u, y + 0.25 * v, u, v, r)
-            for (x, y, _, _, r), (u, v) in zip(agents, moves, strict=True)
-        ]
-    return frames
+class _Crowd:
+    """Frames of a crowd, walked no further than anybody looks."""
+
+    def __init__(self, case: int, n: int) -> None:
+        people = _humans(case, n)
+        self._goals = [(p[2], p[3]) for p in people]
+        self._agents = [(p[0], p[1], 0.0, 0.0, 0.3) for p in people]
+        self._frames: list[Frame] = []
+
+    def __call__(self, k: int) -> Frame:
+        while len(self._frames) <= k:
+            agents = self._agents
+            self._frames.append([(x, y, r, u, v) for x, y, u, v, r in agents])
+            moves = orca_towards(agents, self._goals, 1.0, 5.0, 0.25)
+            self._agents = [
+                (x + 0.25 * u, y + 0.25 * v, u, v, r)
+                for (x, y, _, _, r), (u, v) in zip(agents, moves, strict=True)
+            ]
+        return self._frames[k]
+
+
+_crowd_frames = cache(_Crowd)
 
 
 def _crowd(seed: int, n: int, count: int) -> list[Scene]:
@@ -307,7 +318,7 @@ def _crowd(seed: int, n: int, count: int) -> list[Scene]:
                 f"crowd {n} {case}",
                 (0.0, -4.0),
                 (0.0, 4.0),
-                lambda i, case=case: listed(_crowd_frames(case, n))(i),
+                _crowd_frames(case, n),
                 CROWD_ROBOT,
                 0.25,
                 25.0,
