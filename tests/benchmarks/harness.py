@@ -11,8 +11,11 @@ from tests.benchmarks.scenes import Frame, Robot, Scene
 Seen = list[tuple[float, float, float, float, float, float]]
 """Track identity, x, y, radius, v_x, v_y of the obstacles in sight."""
 
-Step = Callable[[float, float, float, float, float, Seen], tuple[float, float, bool]]
-"""(x, y, heading, v_x, v_y, obstacles in sight) -> velocity (v_x, v_y), retreat."""
+Command = tuple[float, float, bool]
+"""Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
+
+Step = Callable[[float, float, float, float, float, Seen], Command]
+"""(x, y, heading, v_x, v_y, obstacles in sight) -> what to do."""
 
 Planner = Callable[[Scene], Step]
 """Makes a fresh planner for a scene."""
@@ -44,7 +47,7 @@ def unicycle(
     robot: Robot,
     pose: tuple[float, float, float],
     speeds: tuple[float, float],
-    wanted: tuple[float, float, bool],
+    wanted: Command,
     dt: float,
 ) -> tuple[tuple[float, float, float], tuple[float, float]]:
     """One step of the heading law on a unicycle with limited accelerations."""
