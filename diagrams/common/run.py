@@ -1,6 +1,7 @@
 """Running a scenario: build, advance, log; then measure, plot and replay."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 import gc
 import json
@@ -71,6 +72,18 @@ def columns(study: Study, port: str) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
+def rehearse(diagram: Any, context: Any, duration: float) -> None:
+    """Runs the first instants on a copy of the context, and forgets them.
+
+    The blocks' kernels are compiled at their first call, or loaded from the disk: that
+    is no part of the time that a run takes. An error will come again in the run.
+    """
+    simulator = Simulator(diagram, context.Clone())
+    ApplySimulatorConfig(INTEGRATOR, simulator)
+    with suppress(Exception, SystemExit):
+        simulator.AdvanceTo(duration)
+
+
 def simulate(
     scenario: Any,
     meshcat: Any = None,
@@ -107,6 +120,7 @@ def simulate(
     context = simulator.get_mutable_context()
     diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
     run = Run(scenario, study, diagram)
+    rehearse(diagram, context, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:

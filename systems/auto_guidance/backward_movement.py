@@ -10,7 +10,6 @@ constant 1/B and dies out when O stops, as the text says.
 O stops.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp
 from typing import Any
@@ -25,6 +24,7 @@ from systems.auto_guidance.signals import (
     velocity,
 )
 from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
     all_finite,
@@ -32,6 +32,7 @@ from systems.common.geometry import (
     shaft_point_velocity,
     sub,
     unit,
+    xyz,
 )
 
 FORMS = ("corrected", "printed")
@@ -65,22 +66,48 @@ class BackwardMovementParams:
                 raise ValueError(f"{name}={value} must be finite and > 0")
 
 
-def contact_velocity(guide: Sequence[float], obstacle: Sequence[float]) -> Vector:
+@compiled
+def contact_velocity(guide: Numbers, obstacle: Numbers) -> Vector:
     """v_O, the velocity of O's material point M_O, m/s; zero if O is not known."""
     if not (usable(obstacle) and all_finite(guide)):
         return 0.0, 0.0, 0.0
-    o = unit(sub(obstacle[0:3], fulcrum(obstacle)))
+    o = unit(sub(xyz(obstacle, 0), fulcrum(obstacle)))
     return shaft_point_velocity(guide[8], o, velocity(obstacle))
 
 
-def backward_movement(
-    params: BackwardMovementParams, v3: Sequence[float], dt: float, v_o: Sequence[float]
-) -> Vector:
-    """v_3 after a step of `dt` seconds with the obstacle's velocity v_O, m/s."""
-    if params.form == "printed":
+@compiled
+def backward_movement(params: Any, v3: Numbers, dt: float, v_o: Numbers) -> Vector:
+    """v_3 after a step of `dt` seconds with the obstacle's velocity v_O, m/s.
+
+    Args:
+        params: A record of `constants`.
+        v3: Before the step, m/s.
+        dt: s.
+        v_o: Velocity of M_O, m/s.
+    """
+    if params.printed:
         return along(v3, params.gain * dt, v_o)
     # The exact solution for a v_O that is constant over the step.
     return along(v3, 1.0 - exp(-params.gain * dt), sub(v_o, v3))
+
+
+def constants(params: BackwardMovementParams) -> np.ndarray:
+    """The parameters as the compiled functions take them."""
+    return packed(params, printed=params.form == "printed")
+
+
+@compiled
+def _step(
+    record: np.ndarray,
+    state: np.ndarray,
+    time: float,
+    guide: np.ndarray,
+    obstacle: np.ndarray,
+) -> np.ndarray:
+    """The next state: v_3 and the time."""
+    v_o = contact_velocity(guide, obstacle)
+    v3 = backward_movement(record[0], xyz(state, 0), time - state[3], v_o)
+    return np.array((v3[0], v3[1], v3[2], time))
 
 
 class BackwardMovement(Block):
@@ -108,28 +135,27 @@ class BackwardMovement(Block):
         super().__init__()
         self._params = params or BackwardMovementParams()
         self._params.check()
+        self._constants = constants(self._params)
         self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
         self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
         self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        self._v3 = self.vector_out(
-            "v3",
-            3,
-            self._calc_v3,
-            {
-                self._guide.ticket(),
-                self._obstacle.ticket(),
-                self.xd_ticket(),
-                self.time_ticket(),
-            },
-        )
-        self.update_every(self._params.period, self._update)
+        inputs = {
+            self._guide.ticket(),
+            self._obstacle.ticket(),
+            self.xd_ticket(),
+            self.time_ticket(),
+        }
+        # The output and the update share one step.
+        self._step = self.cached("step", self._calc_step, inputs)
+        step_ticket = {self._step.ticket()}
+        self.vector_out("v3", 3, lambda c: self._step.Eval(c)[:3], step_ticket)
+        self.update_every(self._params.period, self._step.Eval)
 
-    def _calc_v3(self, context: Any) -> Vector:
-        *v3, t_last = context.get_discrete_state_vector().value().tolist()
-        v_o = contact_velocity(
-            self._guide.Eval(context).tolist(), self._obstacle.Eval(context).tolist()
+    def _calc_step(self, context: Any) -> np.ndarray:
+        return _step(
+            self._constants,
+            context.get_discrete_state_vector().value(),
+            context.get_time(),
+            self._guide.Eval(context),
+            self._obstacle.Eval(context),
         )
-        return backward_movement(self._params, v3, context.get_time() - t_last, v_o)
-
-    def _update(self, context: Any) -> list[float]:
-        return [*self._v3.Eval(context).tolist(), context.get_time()]
