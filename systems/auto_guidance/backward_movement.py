@@ -68,23 +68,35 @@ class BackwardMovementParams:
 
 @compiled
 def contact_velocity(guide: Numbers, obstacle: Numbers) -> Vector:
-    """v_O, the velocity of O's material point M_O, m/s; zero if O is not known."""
-    if not (usable(obstacle) and all_finite(guide)):
-        return 0.0, 0.0, 0.0
+    """v_O, the velocity of O's material point M_O, m/s.
+
+    Args:
+        guide: The guide signal (12).
+        obstacle: A usable estimate (17) of O.
+    """
     o = unit(sub(xyz(obstacle, 0), fulcrum(obstacle)))
     return shaft_point_velocity(guide[8], o, velocity(obstacle))
 
 
 @compiled
-def backward_movement(params: Any, v3: Numbers, dt: float, v_o: Numbers) -> Vector:
-    """v_3 after a step of `dt` seconds with the obstacle's velocity v_O, m/s.
+def backward_movement(
+    params: Any, v3: Numbers, dt: float, guide: Numbers, obstacle: Numbers
+) -> Vector:
+    """One step of the behaviour.
 
     Args:
         params: A record of `constants`.
-        v3: Before the step, m/s.
-        dt: s.
-        v_o: Velocity of M_O, m/s.
+        v3: v_3 before the step, m/s.
+        dt: Length of the step, s.
+        guide: The guide signal (12).
+        obstacle: Estimate (17) of O; without a usable one v_O counts as zero.
+
+    Returns:
+        v_3 after the step, m/s.
     """
+    v_o = (0.0, 0.0, 0.0)
+    if usable(obstacle) and all_finite(guide):
+        v_o = contact_velocity(guide, obstacle)
     if params.printed:
         return along(v3, params.gain * dt, v_o)
     # The exact solution for a v_O that is constant over the step.
@@ -105,8 +117,8 @@ def _step(
     obstacle: np.ndarray,
 ) -> np.ndarray:
     """The next state: v_3 and the time."""
-    v_o = contact_velocity(guide, obstacle)
-    v3 = backward_movement(record[0], xyz(state, 0), time - state[3], v_o)
+    dt = time - state[3]
+    v3 = backward_movement(record[0], xyz(state, 0), dt, guide, obstacle)
     return np.array((v3[0], v3[1], v3[2], time))
 
 

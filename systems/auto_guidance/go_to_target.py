@@ -29,7 +29,7 @@ the robot away from its goal rather than from the obstacle, and orbits.
 """
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, sqrt
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,7 @@ class GoToTargetParams:
     influence_distance: float = 0.025
     contact_distance: float = 0.005
     damping: float = 60.0
-    max_speed: float = 0.1
+    max_speed: float = 0.06
     max_acceleration: float = 1.0
     goal_distance_floor: float = 0.008
     proportion_floor: float = 0.1
@@ -211,10 +211,11 @@ def corrected_force(params: Any, guide: Numbers, u: Numbers) -> Vector:
     nx = a * (goal[0] - e * n_o[0]) - _TIE * (u[0] - out * n_o[0])
     ny = a * (goal[1] - e * n_o[1]) - _TIE * (u[1] - out * n_o[1])
     nz = a * (goal[2] - e * n_o[2]) - _TIE * (u[2] - out * n_o[2])
-    size = norm((nx, ny, nz))
-    # It fades near the goal, where its direction would flip at every step.
+    # It fades near the goal and where goal and fixed side cancel: there its
+    # direction would flip at every step.
     fade = r_tip / floor if r_tip < floor else 1.0
-    slide = 0.5 * k_r * gap * gap * fade / (s * size) if size > 1e-9 else 0.0
+    size = sqrt(nx * nx + ny * ny + nz * nz + _TIE * _TIE)
+    slide = 0.5 * k_r * gap * gap * fade / (s * size)
     return (
         pull * goal[0] + push * n_o[0] + slide * nx,
         pull * goal[1] + push * n_o[1] + slide * ny,

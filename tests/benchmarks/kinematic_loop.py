@@ -18,10 +18,7 @@ from systems.auto_guidance import (
     go_to_target,
     velocity_corrections,
 )
-from systems.auto_guidance.backward_movement import (
-    BackwardMovementParams,
-    contact_velocity,
-)
+from systems.auto_guidance.backward_movement import BackwardMovementParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams
 from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
@@ -101,6 +98,7 @@ class LocalPlanner:
         target: Sequence[float],
     ) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
+        robot_tool = np.asarray(robot_tool, float)
         self._v1_tip, guide = go_to_target.go_to_target(
             self._go, self._v1_tip, dt, robot_tool, obstacle, target
         )
@@ -114,8 +112,9 @@ class LocalPlanner:
         self.v2 = velocity_corrections.velocity_correction(
             self._corrections, self.v1, self.guide, obstacle
         )
-        v_o = contact_velocity(self.guide, obstacle)
-        self.v3 = backward_movement.backward_movement(self._backward, self.v3, dt, v_o)
+        self.v3 = backward_movement.backward_movement(
+            self._backward, self.v3, dt, self.guide, obstacle
+        )
         self.weights, self._v_tip, _ = fuzzy_arbiter.arbitrate(
             self._arbiter,
             self._v_tip,
@@ -181,12 +180,14 @@ class Outcome:
             contact was made.
         contact: The tools touched.
         clearance: Least distance of the surfaces, m; what it was at contact.
+        fraction: l/L on O where the clearance was least.
         time: Of the first arrival within 1 mm, s; None without one.
     """
 
     reached: bool
     contact: bool
     clearance: float
+    fraction: float
     time: float | None
 
 
@@ -210,7 +211,7 @@ def run(
     """
     robot = robot or Robot()
     tip = scene.p_WPr
-    clearance = float("inf")
+    clearance, fraction = float("inf"), 1.0
     arrival: float | None = None
     target = estimate(scene.p_WPs, scene.p_WPs)
     substeps = 4
@@ -220,7 +221,7 @@ def run(
         p, v, a = scene.obstacle_tip(time)
         v_tip = planner.step(
             PLANNER_PERIOD,
-            np.array([*scene.p_WGr, *tip]),
+            [*scene.p_WGr, *tip],
             estimate(p, scene.p_WGo, v, a),
             target,
         )
@@ -229,13 +230,14 @@ def run(
         for i in range(substeps):
             tip = robot.moved(scene.p_WGr, tip, v_tip, dt)
             p = scene.obstacle_tip(time + (i + 1) * dt)[0]
-            axes = closest_points(scene.p_WGr, tip, scene.p_WGo, p)[2]
-            clearance = min(clearance, axes - CONTACT)
+            _, l_share, axes, _, _ = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
+            if axes - CONTACT < clearance:
+                clearance, fraction = axes - CONTACT, l_share
         if clearance <= 0.0:
-            return Outcome(False, True, clearance, None)
+            return Outcome(False, True, clearance, fraction, arrival)
         near = norm(sub(tip, scene.p_WPs)) < 1e-3
         if near and arrival is None:
             arrival = time + PLANNER_PERIOD
         if near and norm(v_tip) < 2e-3 and time > scene.rest_time:
-            return Outcome(True, False, clearance, arrival)
-    return Outcome(False, False, clearance, arrival)
+            return Outcome(True, False, clearance, fraction, arrival)
+    return Outcome(False, False, clearance, fraction, arrival)
