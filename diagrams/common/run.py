@@ -104,37 +104,39 @@ def simulate(
         ScenarioError: If the scenario cannot run.
     """
     check_scenario(scenario)
+    return simulate_diagram(scenario, build(scenario), meshcat, progress)
+
+
+def simulate_diagram(
+    scenario: Any,
+    diagram: Any,
+    meshcat: Any = None,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Run:
+    """Runs a diagram of one's own making, for example with swapped blocks.
+
+    Args:
+        scenario: The scenario that it was made for.
+        diagram: Exports the ports that the scenario's study logs.
+        meshcat: As for `simulate`.
+        progress: As for `simulate`.
+    """
     study = get_study(scenario.system)
     builder = DiagramBuilder()
-    station = builder.AddNamedSystem("station", build(scenario))
-    sinks = {
-        port: LogVectorOutput(station.GetOutputPort(port), builder, study.log_period)
-        for port in study.signals
-    }
-    for port, sink in sinks.items():
-        sink.set_name(f"log({port})")
+    station = builder.AddNamedSystem("station", diagram)
+    sinks = add_logs(builder, station, study)
     recorder = replay.add_recorder(builder, station, meshcat, study)
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
+    root = builder.Build()
+    simulator = Simulator(root)
     ApplySimulatorConfig(INTEGRATOR, simulator)
     context = simulator.get_mutable_context()
-    diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
-    run = Run(scenario, study, diagram)
-    rehearse(diagram, context, 1.5 * study.log_period)
+    root.SetRandomContext(context, RandomGenerator(scenario.seed))
+    run = Run(scenario, study, root)
+    rehearse(root, context, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
-        simulator.Initialize()
-        recorder.draw(context)
-        for frame in range(1, int(scenario.duration * study.frame_rate) + 2):
-            time = min(frame / study.frame_rate, scenario.duration)
-            start = perf_counter()
-            simulator.AdvanceTo(time)
-            run.wall_time += perf_counter() - start
-            recorder.draw(context)
-            progress(time)
-            if time == scenario.duration:
-                break
+        advance(run, simulator, recorder, progress)
     except KeyboardInterrupt:
         run.error = "interrupted"
     except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
@@ -142,20 +144,58 @@ def simulate(
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    for port, sink in sinks.items():
-        log = sink.FindLog(context)
-        run.signals.setdefault("time", log.sample_times().copy())
-        names = columns(study, port)
-        for name, row in zip(names, log.data(), strict=True):
-            run.signals[name] = row.copy()
-    shortest = min(len(column) for column in run.signals.values())
-    run.signals = {name: column[:shortest] for name, column in run.signals.items()}
+    run.signals = read_logs(sinks, study, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
-    if shortest > 1:
+    if len(run.signals["time"]) > 1:
         run.metrics = metrics.common(run) | study.measure(run)
     recorder.finish(run)
     return run
+
+
+def advance(
+    run: Run,
+    simulator: Any,
+    recorder: replay.Recorder,
+    progress: Callable[[float], None],
+) -> None:
+    """Steps the simulator from frame to frame; only the steps are timed."""
+    duration, rate = run.scenario.duration, run.study.frame_rate
+    simulator.Initialize()
+    recorder.draw(simulator.get_context())
+    time, frame = 0.0, 0
+    while time < duration:
+        frame += 1
+        time = min(frame / rate, duration)
+        start = perf_counter()
+        simulator.AdvanceTo(time)
+        run.wall_time += perf_counter() - start
+        recorder.draw(simulator.get_context())
+        progress(time)
+
+
+def add_logs(builder: Any, station: Any, study: Study) -> dict[str, Any]:
+    """Logs the study's signals: port name to log sink."""
+    sinks = {}
+    for port in study.signals:
+        output = station.GetOutputPort(port)
+        sinks[port] = LogVectorOutput(output, builder, study.log_period)
+        sinks[port].set_name(f"log({port})")
+    return sinks
+
+
+def read_logs(
+    sinks: dict[str, Any], study: Study, context: Any
+) -> dict[str, np.ndarray]:
+    """All columns of the log, of one length; "time" is the first."""
+    signals: dict[str, np.ndarray] = {}
+    for port, sink in sinks.items():
+        log = sink.FindLog(context)
+        signals.setdefault("time", log.sample_times().copy())
+        for name, row in zip(columns(study, port), log.data(), strict=True):
+            signals[name] = row.copy()
+    shortest = min(len(column) for column in signals.values())
+    return {name: column[:shortest] for name, column in signals.items()}
 
 
 def prepare_folder(out: Path) -> None:

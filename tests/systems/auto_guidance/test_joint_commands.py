@@ -1,11 +1,17 @@
-"""Joint commands: the free minimum, the bounded one, and the arm that follows."""
+"""Tests of the joint commands: against Drake's own inverse kinematics, and limits."""
 
 import numpy as np
+from pydrake.multibody.inverse_kinematics import (
+    DifferentialInverseKinematicsParameters,
+    DoDifferentialInverseKinematics,
+)
+from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 import pytest
 
 from plants.arm.arm import SetPoint
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
+from plants.arm.parameters import READY_POSTURE
 from systems.auto_guidance import joint_commands
 from systems.auto_guidance.joint_commands import (
     JointCommands,
@@ -13,120 +19,172 @@ from systems.auto_guidance.joint_commands import (
     free_velocity,
     joint_velocity,
 )
+from tests.loosely import loosely
 
-WIDE = np.full(7, 1e3)
+tool_twist = loosely(joint_commands.tool_twist)
+
+PLANT = make_controller_plant()
+TIP = PLANT.GetFrameByName(INSTRUMENT_TIP)
+PERIOD = JointCommandsParams().period
 
 
-def problem(seed):
+def kinematics(q):
+    """Context, tip position, shaft direction and Jacobian at a posture."""
+    context = PLANT.CreateDefaultContext()
+    PLANT.SetPositions(context, q)
+    X_WT = TIP.CalcPoseInWorld(context)
+    world = PLANT.world_frame()
+    J = PLANT.CalcJacobianSpatialVelocity(
+        context, JacobianWrtVariable.kV, TIP, np.zeros(3), world, world
+    )
+    return context, X_WT.translation(), X_WT.rotation().col(2), J
+
+
+def test_velocities_agree_with_drakes_own_inverse_kinematics():
+    rng = np.random.default_rng(1)
+    speed = np.ones(7)
+    limits = DifferentialInverseKinematicsParameters(7, 7)
+    limits.set_time_step(PERIOD)
+    limits.set_joint_velocity_limits((-speed, speed))
+    limits.set_nominal_joint_position(np.array(READY_POSTURE))
+    limits.set_joint_centering_gain(0.2 * np.eye(7))
+    for _ in range(30):
+        q = READY_POSTURE + rng.uniform(-0.2, 0.2, 7)
+        context, _, _, J = kinematics(q)
+        V = rng.uniform(-0.05, 0.05, 6)
+        ours = joint_velocity(J, V, 0.2 * (READY_POSTURE - q), -speed, speed)
+        drake = DoDifferentialInverseKinematics(PLANT, context, V, TIP, limits)
+        np.testing.assert_allclose(ours, drake.joint_velocities, atol=2e-3)
+        np.testing.assert_allclose(J @ ours, V, atol=1e-4)
+
+
+def random_problem(seed):
     rng = np.random.default_rng(seed)
     return rng.normal(size=(6, 7)), rng.normal(size=6), rng.normal(size=7)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_free_minimum_is_the_quadratic_programs_without_bounds(seed):
-    J, V, v_nominal = problem(seed)
-    expected = joint_velocity(J, V, v_nominal, -WIDE, WIDE)
+    J, V, v_nominal = random_problem(seed)
+    wide = np.full(7, 1e3)
+    expected = joint_velocity(J, V, v_nominal, -wide, wide)
     v = free_velocity(J, V, v_nominal)
     np.testing.assert_allclose(v, expected, rtol=1e-6, atol=1e-8)
     np.testing.assert_allclose(J @ v, V, atol=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_bounds_hold_where_the_free_minimum_breaks_them(seed):
-    J, V, v_nominal = problem(seed)
+def test_bounded_minimum_cannot_be_improved(seed):
+    J, V, v_nominal = random_problem(seed)
     limit = 0.5 * abs(free_velocity(J, V, v_nominal)).max()
     high = np.full(7, limit)
     v = joint_velocity(J, V, v_nominal, -high, high)
-    assert abs(v).max() <= limit + 1e-12
     assert abs(v).max() == pytest.approx(limit)
-    # A minimum: no step back from the bounds makes it better.
     gradient = J.T @ (J @ v - V) + 1e-6 * (v - v_nominal)
     inside = abs(v) < limit - 1e-9
     np.testing.assert_allclose(gradient[inside], 0.0, atol=1e-6)
     assert (gradient[~inside] * v[~inside] <= 1e-9).all()
 
 
-def drive(velocity, seconds=0.5, params=None):
-    """The command of a tool that moves from rest with a velocity in W [m/s]."""
+def test_bounds_hold_and_lead_back():
+    _, _, _, J = kinematics(READY_POSTURE)
+    low, high = -np.full(7, 0.1), np.full(7, 0.1)
+    v = joint_velocity(J, np.array([0.0, 0, 0, 1.0, 1.0, 0]), np.zeros(7), low, high)
+    assert v.max() <= 0.1 + 1e-9 and v.min() >= -0.1 - 1e-9
+    high[3] = -0.05  # the joint stands beyond its stop
+    v = joint_velocity(J, np.zeros(6), np.zeros(7), low, high)
+    assert v[3] <= -0.05 + 1e-9
+
+
+def test_twist_keeps_the_roll():
+    u = np.array([0.1, -0.2, -0.97])
+    u /= np.linalg.norm(u)
+    du = np.cross([0.3, 0.1, 0.2], u)
+    tool = [0.0, 0.0, -0.1, *u, 0.01, 0.0, 0.0, *du, 1.0]
+    w, v = tool_twist([0.0, 0.0, -0.1], u, tool, 1.0, PERIOD, 0.3)
+    twist = np.array([*w, *v])
+    assert twist[:3] @ u == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(np.cross(twist[:3], u), du, atol=1e-12)
+    np.testing.assert_allclose(twist[3:], [0.01, 0.0, 0.0])
+
+
+def follow(tool_at, seconds, params=None):
+    """Runs the block on a commanded motion; rows of posture, set-point, status."""
     dut = JointCommands(params)
     context = dut.CreateDefaultContext()
-    port = dut.GetInputPort("tool")
-    start = dut.AllocateInputVector(port).value()
-    start[6:9] = velocity
     simulator = Simulator(dut, context)
-    for k in range(round(seconds * 60)):
-        tool = start.copy()
-        tool[:3] += start[6:9] * k / 60
-        tool[12] = k / 60
-        port.FixValue(context, tool)
-        simulator.AdvanceTo((k + 0.99) / 60)
-    return dut, context, start
+    rows = []
+    for k in range(round(seconds * 120)):
+        dut.GetInputPort("tool").FixValue(context, tool_at(k / 120))
+        simulator.AdvanceTo((k + 0.5) / 120)
+        names = ("posture", "set_point", "status")
+        rows.append([np.array(dut.GetOutputPort(n).Eval(context)) for n in names])
+    return rows
 
 
-def tip_at(posture):
-    plant = make_controller_plant()
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, posture)
-    return plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(context)
+def circle(t, radius=0.02, rate=2.0):
+    """A circle about the ready posture's tip, through the fulcrum at the origin."""
+    p = np.array([radius * np.sin(rate * t), radius * (1 - np.cos(rate * t)), -0.12])
+    v = radius * rate * np.array([np.cos(rate * t), np.sin(rate * t), 0.0])
+    q = np.linalg.norm(p)
+    u = p / q
+    return [*p, *u, *v, *((v - (v @ u) * u) / q), t]
 
 
-def test_posture_carries_the_tool_along():
-    dut, context, start = drive([0.03, 0.01, -0.02])
-    X_WT = tip_at(dut.GetOutputPort("posture").Eval(context))
-    # 60 updates of 1/120 s: the posture is the one of the next instant.
-    np.testing.assert_allclose(
-        X_WT.translation(), start[:3] + 0.5 * start[6:9], atol=2e-5
-    )
-    np.testing.assert_allclose(X_WT.rotation().col(2), start[3:6], atol=1e-4)
-    assert dut.GetOutputPort("status").Eval(context)[0] == 0.0
+def test_the_posture_follows_a_circle_through_the_fulcrum():
+    rows = follow(circle, 3.0)
+    for k, (posture, _, status) in enumerate(rows[60:], start=60):
+        tool = np.array(circle((k + 1) / 120))
+        _, p, u, _ = kinematics(posture)
+        assert np.linalg.norm(p - tool[:3]) < 1e-4
+        assert np.linalg.norm(u - tool[3:6]) < 1e-3
+        assert status[0] == 0.0
 
 
-def test_joint_speeds_are_kept_and_said():
-    params = JointCommandsParams(joint_speed=0.02)
-    plant = make_controller_plant()
-    limit = 0.02 * plant.GetVelocityUpperLimits()
-    dut, context, _ = drive([0.1, 0.0, 0.0], params=params)
-    moved = dut.GetOutputPort("posture").Eval(context)
-    context.SetTime(context.get_time() + 1e-6)
-    state = dut.EvalUniquePeriodicDiscreteUpdate(context)
-    v = (state.value(0) - moved) / params.period
-    assert (abs(v) <= limit + 1e-9).all()
-    assert (abs(v) >= limit - 1e-9).any()
-    assert dut.GetOutputPort("status").Eval(context)[0] == 1.0
+def test_set_points_are_the_servos_for_the_motion_and_the_weight():
+    (before, _, _), (after, set_point, _) = follow(circle, 0.5)[-2:]
+    context, *_ = kinematics(before)
+    weight = PLANT.CalcGravityGeneralizedForces(context)
+    v = (after - before) / PERIOD
+    expected = SetPoint(period=PERIOD)(before, v, -weight)
+    np.testing.assert_allclose(set_point, expected, atol=1e-9)
 
 
-def test_set_point_is_the_servos():
-    dut, context, _ = drive([0.02, 0.0, 0.0])
-    q = dut.GetOutputPort("posture").Eval(context)
-    state = dut.EvalUniquePeriodicDiscreteUpdate(context)
-    v = (state.value(0) - q) / JointCommandsParams().period
-    plant = make_controller_plant()
-    plant_context = plant.CreateDefaultContext()
-    plant.SetPositions(plant_context, q)
-    weight = plant.CalcGravityGeneralizedForces(plant_context)
-    expected = SetPoint(period=JointCommandsParams().period)(q, v, -weight)
-    np.testing.assert_allclose(state.value(1), expected, atol=1e-12)
+def test_too_fast_a_command_is_reported_and_bounded():
+    def fast(t):
+        return [0.5 * t, 0.0, -0.12, 0, 0, -1, 0.5, 0, 0, 0, 0, 0, t]
 
-
-def test_command_that_is_not_finite_holds_the_arm():
-    dut, context, start = drive([0.02, 0.0, 0.0])
-    q = dut.GetOutputPort("posture").Eval(context)
-    start[4] = np.nan
-    dut.GetInputPort("tool").FixValue(context, start)
-    state = dut.EvalUniquePeriodicDiscreteUpdate(context)
-    np.testing.assert_array_equal(state.value(0), q)
-    assert state.value(2)[0] == 1.0
+    rows = follow(fast, 0.3, JointCommandsParams(joint_speed=0.05))
+    speed = PLANT.GetVelocityUpperLimits() * 0.05
+    step = np.diff([posture for posture, _, _ in rows], axis=0) / PERIOD
+    assert (np.abs(step) <= speed + 1e-6).all()
+    assert rows[-1][2][0] == 1.0
 
 
 def test_quadprog_is_asked_only_where_bounds_are_met(monkeypatch):
     asked = []
-    solve = joint_commands.joint_velocity
-    monkeypatch.setattr(
-        joint_commands,
-        "joint_velocity",
-        lambda *args: asked.append(1) or solve(*args),
-    )
-    drive([0.02, 0.0, 0.0], 0.1)
+
+    def watched(*args):
+        asked.append(args)
+        return joint_velocity(*args)
+
+    monkeypatch.setattr(joint_commands, "joint_velocity", watched)
+    follow(circle, 0.1)
     assert not asked
-    drive([0.1, 0.0, 0.0], 0.1, JointCommandsParams(joint_speed=0.02))
+    follow(circle, 0.1, JointCommandsParams(joint_speed=0.01))
     assert asked
+
+
+def test_a_command_that_is_no_number_holds_the_arm():
+    rows = follow(lambda t: [np.nan] * 13, 0.1)
+    np.testing.assert_allclose(rows[-1][0], READY_POSTURE)
+    assert rows[-1][2][0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("period", 0.0), ("gain", 1.5), ("joint_speed", 0.0), ("joint_margin", -1.0)],
+)
+def test_bad_parameters_are_named(name, value):
+    with pytest.raises(ValueError, match=name):
+        JointCommands(JointCommandsParams(**{name: value}))
