@@ -73,14 +73,22 @@ def columns(study: Study, port: str) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
-def rehearse(diagram: Any, context: Any, duration: float) -> None:
+def rehearse(
+    diagram: Any, context: Any, config: SimulatorConfig, duration: float
+) -> None:
     """Runs the first instants on a copy of the context, and forgets them.
 
     The blocks' kernels are compiled at their first call, or loaded from the disk: that
     is no part of the time that a run takes. An error will come again in the run.
+
+    Args:
+        diagram: The root diagram.
+        context: At the start of the run.
+        config: The run's integrator.
+        duration: How far to go, in s.
     """
     simulator = Simulator(diagram, context.Clone())
-    ApplySimulatorConfig(INTEGRATOR, simulator)
+    ApplySimulatorConfig(config, simulator)
     with announced(), suppress(Exception, SystemExit):
         simulator.AdvanceTo(duration)
 
@@ -129,11 +137,12 @@ def simulate_diagram(
     recorder = replay.add_recorder(builder, station, meshcat, study)
     root = builder.Build()
     simulator = Simulator(root)
-    ApplySimulatorConfig(INTEGRATOR, simulator)
+    config = study.integrator(scenario) or INTEGRATOR
+    ApplySimulatorConfig(config, simulator)
     context = simulator.get_mutable_context()
     root.SetRandomContext(context, RandomGenerator(scenario.seed))
     run = Run(scenario, study, root)
-    rehearse(root, context, 1.5 * study.log_period)
+    rehearse(root, context, config, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:

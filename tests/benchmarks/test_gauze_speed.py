@@ -3,7 +3,7 @@
 import pytest
 
 from diagrams.common.scenario import load_scenario
-from tests.benchmarks.gauze_speed import measure, table
+from tests.benchmarks.gauze_speed import measure, summary, table
 
 
 def test_the_parts_add_up():
@@ -15,6 +15,7 @@ def test_the_parts_add_up():
     assert sum(share.wall for share in blocks) == pytest.approx(shares[1].wall)
     assert {"  joint_commands", "  go_to_target"} <= {share.name for share in blocks}
     assert shares[0].wall > 0.0
+    assert "real_time_factor" in summary(runs)
 
 
 def test_the_table_names_every_part():
