@@ -145,6 +145,10 @@ def _positioning(p: Any, n: Any, h: float, bend: float, travel: Any, q: Any) -> 
 def solve_positionings(
     p: Any, n: Any, h: float, bend: float, travel: Any, q: Any, status: Any
 ) -> None:
+    """Positioning postures (N, 5) and statuses (N,) for p_WI, n_WI (N, 3) (compiled).
+
+    NaN stands in q where the bends do not reach.
+    """
     for i in range(p.shape[0]):
         q[i, :] = np.nan
         status[i] = _positioning(p[i], n[i], h, bend, travel, q[i])
@@ -162,6 +166,7 @@ def solve_tools(
     q: Any,
     status: Any,
 ) -> None:
+    """Postures (N, 7) and statuses (N,) for p_WT, n_WT, m = n_WI (N, 3) (compiled)."""
     p_I = np.empty(3)
     for i in range(p.shape[0]):
         q[i, :] = np.nan
