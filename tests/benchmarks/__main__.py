@@ -6,6 +6,7 @@ import importlib
 BENCHMARKS = {
     "speed": "tests.benchmarks.gauze_speed",
     "scenes": "tests.benchmarks.kinematic_scenes",
+    "snake": "tests.benchmarks.snake_speed",
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 
@@ -21,7 +22,9 @@ def main() -> None:
     arguments = parser.parse_args()
     for name in arguments.only or BENCHMARKS:
         module = importlib.import_module(BENCHMARKS[name])
-        print(f"\n== {name}: {(module.__doc__ or '').partition(chr(10))[0]}", flush=True)
+        print(
+            f"\n== {name}: {(module.__doc__ or '').partition(chr(10))[0]}", flush=True
+        )
         print(module.report(arguments.seed, arguments.scenes), flush=True)
 
 
