@@ -9,6 +9,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 
 STUDIES = {
     "gauze": "diagrams.gauze.study",
+    "navigation": "diagrams.navigation.study",
     "snake": "diagrams.resection.snake_study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
