@@ -64,11 +64,12 @@ STUDY = Study(
     decorate=decorate,
     controller="planner",
     required=("system", "duration", "start", "goal"),
+    frame_rate=20.0,  # as often as the planner: other instants would cost steps
     view=View(camera=(4.0, -7.5, 7.0), target=(4.5, 0.0, 0.0)),
     # No MultibodyPlant here: CENIC needs one. Fixed steps, on the planner's clock.
     integrator=lambda scenario: SimulatorConfig(
         integration_scheme="runge_kutta3",
-        max_step_size=0.025,
+        max_step_size=0.05,
         use_error_control=False,
     ),
 )
