@@ -56,13 +56,20 @@ CAPACITY = 24
 
 def make_planner(scenario: NavigationScenario) -> Any:
     """The planner that the scenario names; its body and limits are the robot's."""
-    body = {"body_radius": scenario.robot.radius, "speed": scenario.robot.speed}
+    radius, speed = scenario.robot.radius, scenario.robot.speed
     if scenario.planner == "classical":
-        return ClassicalPlanner(replace(scenario.classical, **body), CAPACITY)
+        classical = replace(scenario.classical, body_radius=radius, speed=speed)
+        return ClassicalPlanner(classical, CAPACITY)
     if scenario.planner == "statechart":
-        return StatechartPlanner(replace(scenario.statechart, **body), CAPACITY)
-    params = replace(scenario.switching, vision=scenario.perception.vision, **body)
-    return SwitchingPlanner(params, CAPACITY)
+        statechart = replace(scenario.statechart, body_radius=radius, speed=speed)
+        return StatechartPlanner(statechart, CAPACITY)
+    switching = replace(
+        scenario.switching,
+        body_radius=radius,
+        speed=speed,
+        vision=scenario.perception.vision,
+    )
+    return SwitchingPlanner(switching, CAPACITY)
 
 
 def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:

@@ -56,7 +56,19 @@ def arrows(
     u, v = np.vectorize(field)(x, y)
     size = np.hypot(u, v)
     scale = np.minimum(1.0, longest / np.maximum(size, 1e-9))
-    axes.quiver(x, y, scale * u, scale * v, size, cmap="viridis", pivot="mid")
+    axes.quiver(
+        x,
+        y,
+        scale * u,
+        scale * v,
+        np.minimum(size, longest),
+        cmap="viridis",
+        pivot="mid",
+        angles="xy",
+        scale_units="xy",
+        scale=longest / 0.15,
+        clim=(0.0, longest),
+    )
     axes.plot(*centre, "o", color=COLORS["obstacle"], ms=7)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
     axes.set_title(title)
@@ -81,7 +93,9 @@ def total_potential(
         low: Least x, y [m].
         high: Greatest x, y [m].
     """
-    x, y = np.meshgrid(np.linspace(low[0], high[0], 90), np.linspace(low[1], high[1], 90))
+    x, y = np.meshgrid(
+        np.linspace(low[0], high[0], 90), np.linspace(low[1], high[1], 90)
+    )
     z = 0.5 * params.gain * ((x - goal[0]) ** 2 + (y - goal[1]) ** 2)
     # Saturated attraction: linear beyond the distance at which it is full.
     far = params.speed / params.gain
@@ -91,7 +105,9 @@ def total_potential(
         rho = np.hypot(x - a, y - b) - radius - params.body_radius
         repulse = np.where(
             rho < params.range,
-            0.5 * params.repulsion * (1.0 / np.maximum(rho, 0.05) - 1.0 / params.range) ** 2,
+            0.5
+            * params.repulsion
+            * (1.0 / np.maximum(rho, 0.05) - 1.0 / params.range) ** 2,
             0.0,
         )
         z = z + repulse
@@ -113,7 +129,7 @@ STATECHART = """digraph {
     omega -> obstacle [label="at P1"]; }
   start -> attractive;
   attractive -> omega [label="obstacle in the tube:\\nsense s, Omega, P1, P2"];
-  obstacle -> attractive [label="at P2"];
+  obstacle -> attractive [label="at P2", constraint=false];
 }"""
 """Figure 11: the thesis's statechart."""
 
@@ -127,7 +143,8 @@ FLOWCHART = """digraph {
   any [shape=diamond, label="a heading free?", fillcolor="#f6e3d3"];
   attractive [label="attractive potential"];
   bypass [label="involute-helicoid of the obstacle and side\\nat the end of the arcs"];
-  group [label="involute-helicoid of the group's member,\\nuntil the goal's ray leads nearer than ever"];
+  group [label="involute-helicoid of the group's member,
+until the goal's ray leads nearer than ever"];
   narrower [label="narrower margin, then slower,\\nthen what is hit last"];
   move [label="velocity to the control law"];
   see -> free; free -> attractive [label="yes"]; free -> arcs [label="no"];
@@ -160,6 +177,7 @@ def thesis_figures() -> dict[str, Figure]:
         x, y, z = np.vectorize(fields.helicoid_point)(r, xi, 2.0)
         axes.plot_surface(x + 1.0, y + 1.0, z, cmap="viridis", rcount=160, lw=0)
         axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z")
+        axes.set(xticks=(0.0, 1.0, 2.0), yticks=(0.0, 1.0, 2.0))
         axes.set_title("Figure 9a: helicoid, c = 2 (equation 5)")
         axes.set_box_aspect((1.0, 1.0, 1.1), zoom=0.82)
         return figure
@@ -190,7 +208,7 @@ def thesis_figures() -> dict[str, Figure]:
             "Figure 6b: its anti-gradient",
             lambda x, y: fields.repulsive_field(x - ox, y - oy, 0.0, RHO_0),
             OBSTACLE,
-            3.0,
+            2.0,
         ),
         "figure_09a": helix(),
         "figure_09b": surface(
@@ -208,7 +226,7 @@ def thesis_figures() -> dict[str, Figure]:
             "The involute-helicoid, rho = 0.5 m, clockwise",
             lambda x, y: fields.involute_field(x - cx + 1e-9, y - cy, 0.5, -1.0),
             CENTRE,
-            4.0,
+            1.0,
         ),
         "figure_11": chart(STATECHART, 8.0, 2.6),
         "figure_12": chart(FLOWCHART, 6.5, 7.5),

@@ -37,8 +37,14 @@ def companions(run: Any) -> dict[str, Any]:
 
 
 def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
-    """Draws obstacles, fainter where they were earlier, start and goal."""
+    """Draws obstacles, fainter where they were earlier, start and goal.
+
+    Time ends a little after the goal is reached.
+    """
     rows = run.matrix("obstacles.rows")
+    arrival = run.metrics["time_to_target"]
+    if arrival is not None:
+        rows = rows[run.signals["time"] <= arrival + 1.0]
     rows = rows.reshape(len(rows), -1, 5)
     for k in range(rows.shape[1]):
         if rows[0, k, 2] <= 0.0 or abs(rows[0, k, 0]) > 500.0:
@@ -55,7 +61,7 @@ def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
         if moves:
             axes.plot(*track.T, ":", color=COLORS["obstacle"], lw=0.8)
     axes.plot(*run.scenario.start, "o", color="k", ms=5)
-    axes.plot(*run.scenario.goal, "*", color=COLORS["target"], ms=13)
+    axes.plot(*run.scenario.goal, "*", color=COLORS["target"], ms=13, zorder=5)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
 
 
@@ -77,8 +83,9 @@ def draw_ways(axes: Any, runs: dict[str, Any]) -> None:
         robot = robot[: hit[0] + 1] if hit.size else robot
         label = f"{name}: {outcome(run)}"
         axes.plot(*robot[:, :2].T, color=PLANNER_COLORS[name], lw=1.8, label=label)
-        end = "X" if hit.size else "s"
-        axes.plot(*robot[-1, :2], end, color=PLANNER_COLORS[name], ms=7)
+        if not run.metrics["reached"]:
+            end = "X" if hit.size else "s"
+            axes.plot(*robot[-1, :2], end, color=PLANNER_COLORS[name], ms=7)
 
 
 def path(run: Any, runs: dict[str, Any]) -> Figure:
@@ -129,8 +136,9 @@ def potential(run: Any, runs: dict[str, Any]) -> Figure:
     world = [
         (float(k), *o.start, o.radius, 0.0, 0.0) for k, o in enumerate(s.obstacles)
     ]
-    low = np.minimum(s.start, s.goal) - 2.0
-    high = np.maximum(s.start, s.goal) + 2.0
+    middle = 0.5 * (np.array(s.start) + s.goal)
+    half = np.maximum(np.abs(middle - s.start) + 1.0, 3.5)
+    low, high = middle - half, middle + half
     figure = new_figure(7.5, 6.0)
     axes = add_axes(figure, 1, 1, 1)
     params = replace(s.classical, body_radius=s.robot.radius, speed=s.robot.speed)

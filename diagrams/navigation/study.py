@@ -9,7 +9,7 @@ from pydrake.systems.analysis import SimulatorConfig
 
 from diagrams.common.replay import draw_trail
 from diagrams.common.study import Study, View
-from diagrams.navigation.diagram import CAPACITY, make_navigation_diagram
+from diagrams.navigation.diagram import CAPACITY, floor, make_navigation_diagram
 from diagrams.navigation.metrics import measure
 from diagrams.navigation.plots import plots, state_names
 from diagrams.navigation.scenario import NavigationScenario, check
@@ -33,8 +33,24 @@ LAMPS = (
 """Colours of the lamp above the robot, by the planner's state."""
 
 
+def light(meshcat: Any, floor: list[float]) -> None:
+    """Even light, and the whole floor in view."""
+    for name, intensity in (
+        ("AmbientLight", 1.6),
+        ("FillLight", 0.7),
+        ("PointLightNegativeX", 0.0),
+        ("PointLightPositiveX", 0.0),
+        ("SpotLight", 0.0),
+    ):
+        meshcat.SetProperty(f"/Lights/{name}/<object>", "intensity", intensity)
+    x, y = 0.5 * (floor[0] + floor[2]), 0.5 * (floor[1] + floor[3])
+    size = max(floor[2] - floor[0], 1.3 * (floor[3] - floor[1]))
+    meshcat.SetCameraPose([x, y - 0.36 * size, 0.48 * size], [x, y, 0.0])
+
+
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The robot's trail, and a lamp above it in the colour of the state."""
+    light(meshcat, floor(run.scenario))
     time = run.signals["time"]
     robot = run.matrix("robot.state")
     trail = np.column_stack([robot[:, :2], np.full(len(time), 0.02)])

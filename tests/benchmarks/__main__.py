@@ -7,6 +7,7 @@ BENCHMARKS = {
     "speed": "tests.benchmarks.gauze_speed",
     "scenes": "tests.benchmarks.kinematic_scenes",
     "snake": "tests.benchmarks.snake_speed",
+    "switching": "tests.benchmarks.switching_suite",
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 
