@@ -9,7 +9,7 @@ nearest to a wanted one, whatever the number of discs.
 """
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, pi, sin, sqrt
 
 from systems.switching.fields import involute_components
 
@@ -113,6 +113,9 @@ def blocked_arcs(
             # A standing one only forbids to go deeper: between two of them both
             # ways along must stay free.
             along, out = 1.0, 0.0
+        elif d >= rho:  # as involute_components, without the call
+            along = rho / d
+            out = -sqrt(1.0 - along * along)
         else:
             along, out = involute_components(d, rho)
         ox = out * nx
@@ -151,34 +154,39 @@ def _arcs_of_fast(
     if d - rho > horizon * (sqrt(ww) + speed):
         return []
     along, out = involute_components(d, rho)
-    edges = []
-    for side in (along, -along):
-        ex, ey = out * nx - side * ny, out * ny + side * nx
+    edges: list[float] = []
+    for ex, ey in (
+        (out * nx - along * ny, out * ny + along * nx),
+        (out * nx + along * ny, out * ny - along * nx),
+    ):
         k = ex * wx + ey * wy
         discriminant = k * k + speed * speed - ww
         # At equal speeds one root is u = 0: the heading of the obstacle itself
         # bounds the arc, so that roots at zero must not be lost to rounding.
         if discriminant > -1e-4 * ww:
-            root = sqrt(max(discriminant, 0.0))
-            edges += [
-                atan2(wy + s * ey, wx + s * ex)
-                for s in (-k - root, -k + root)
-                if s > -0.01 * speed
-            ]
-
-    def blocked(heading: float) -> bool:
-        ux, uy = speed * cos(heading) - wx, speed * sin(heading) - wy
-        return ux * nx + uy * ny < out * hypot(ux, uy)
-
-    if not edges:
-        return [(0.0, TWO_PI, obstacle)] if blocked(0.0) else []
+            root = sqrt(discriminant) if discriminant > 0.0 else 0.0
+            least = -0.01 * speed
+            if -k - root > least:
+                s = -k - root
+                edges.append(atan2(wy + s * ey, wx + s * ex))
+            if -k + root > least:
+                s = -k + root
+                edges.append(atan2(wy + s * ey, wx + s * ex))
     edges.sort()
-    following = [*edges[1:], edges[0] + TWO_PI]
-    return [
-        (a, b - a, obstacle)
-        for a, b in zip(edges, following, strict=True)
-        if blocked(0.5 * (a + b))
-    ]
+    if not edges:
+        edges = [0.0]  # all headings are blocked, or none
+    arcs: list[Arc] = []
+    before = edges[-1] - TWO_PI
+    for edge in edges:
+        width = edge - before
+        if width > 1e-9:
+            middle = before + 0.5 * width
+            ux = speed * cos(middle) - wx
+            uy = speed * sin(middle) - wy
+            if ux * nx + uy * ny < out * sqrt(ux * ux + uy * uy):
+                arcs.append((before, width, obstacle))
+        before = edge
+    return arcs
 
 
 def nearest_free(
