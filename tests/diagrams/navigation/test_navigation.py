@@ -82,9 +82,9 @@ def test_noise_is_repeatable_and_survived():
         np.testing.assert_array_equal(column, again.signals[name])
 
 
-def test_the_trap_is_left_with_noise():
+def test_the_gap_is_passed_with_noise():
     noise = ("perception.position_noise=0.01", "perception.velocity_noise=0.05")
-    r = run("u_trap", *noise)
+    r = run("local_minimum", *noise)
     assert r.metrics["reached"] and not r.metrics["collided"]
 
 
