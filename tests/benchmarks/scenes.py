@@ -7,7 +7,7 @@ computed beforehand. Every suite is a function of a seed.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
-from itertools import pairwise
+import itertools
 from math import cos, hypot, pi, sin
 
 import numpy as np
@@ -233,7 +233,7 @@ def static_20(seed: int, count: int = 100) -> list[Scene]:
 def wall(points: list[tuple[float, float]], radius: float = 0.2):
     """Standing discs that touch each other along a chain of straight lines."""
     discs = []
-    for (ax, ay), (bx, by) in pairwise(points):
+    for (ax, ay), (bx, by) in itertools.pairwise(points):
         n = max(int(round(hypot(bx - ax, by - ay) / (2.0 * radius))), 1)
         for k in range(n + 1):
             s = k / n
@@ -264,14 +264,24 @@ def classics(seed: int = 0, count: int = 6) -> list[Scene]:
     ]
 
 
-def _humans(case: int, n: int) -> list[list[float]]:
-    """Start and goal of the humans of a CrowdNav test case.
+TRIES = 30_000
+"""After so many draws without room for the next human, a case is jammed."""
 
-    Drawn as the CrowdNav code draws them (circle crossing, all humans alike).
+
+@cache
+def _humans(case: int, n: int) -> list[list[float]] | None:
+    """Start and goal of the humans of a CrowdNav test case; None if they jam.
+
+    Drawn as the CrowdNav code draws them (circle crossing, all humans alike). With
+    twenty, about one case in sixty leaves no room for the last one.
     """
     rng = np.random.RandomState(case)
     people = [[0.0, -4.0, 0.0, 4.0]]  # the robot
+    tries = 0
     while len(people) <= n:
+        tries += 1
+        if tries > TRIES:
+            return None
         angle = rng.random_sample() * pi * 2.0
         x = 4.0 * cos(angle) + (rng.random_sample() - 0.5)
         y = 4.0 * sin(angle) + (rng.random_sample() - 0.5)
@@ -288,7 +298,7 @@ class _Crowd:
     """Frames of a crowd, walked no further than anybody looks."""
 
     def __init__(self, case: int, n: int) -> None:
-        people = _humans(case, n)
+        people = _humans(case, n) or []
         self._goals = [(p[2], p[3]) for p in people]
         self._agents = [(p[0], p[1], 0.0, 0.0, 0.3) for p in people]
         self._frames: list[Frame] = []
@@ -309,22 +319,20 @@ _crowd_frames = cache(_Crowd)
 
 
 def _crowd(seed: int, n: int, count: int) -> list[Scene]:
-    scenes = []
-    for k in range(count):
-        # Cases 100 to 599 are the test set of CrowdNav.
-        case = 100 + k + 10_000 * seed
-        scenes.append(
-            Scene(
-                f"crowd {n} {case}",
-                (0.0, -4.0),
-                (0.0, 4.0),
-                _crowd_frames(case, n),
-                CROWD_ROBOT,
-                0.25,
-                25.0,
-            )
+    # Cases 100 to 599 are the test set of CrowdNav.
+    cases = (case for case in itertools.count(100 + 10_000 * seed) if _humans(case, n))
+    return [
+        Scene(
+            f"crowd {n} {case}",
+            (0.0, -4.0),
+            (0.0, 4.0),
+            _crowd_frames(case, n),
+            CROWD_ROBOT,
+            0.25,
+            25.0,
         )
-    return scenes
+        for case in itertools.islice(cases, count)
+    ]
 
 
 def crowd_5(seed: int, count: int = 500) -> list[Scene]:
