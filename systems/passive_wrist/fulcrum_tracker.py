@@ -1,0 +1,261 @@
+"""The recursive estimate of a breathing fulcrum from wrench and shaft pose.
+
+Three decisions keep it consistent where a plain extended Kalman filter is not:
+
+- Breathing is switched on only once `breathing_rate` has found its rate in a
+  record of the last twelve seconds, and that record is then *filtered again* from
+  its start with the rate known: what an early probe said of the depth is not lost
+  in the time in which the wall's motion was not yet understood. Before that the
+  mean walks fast enough to follow a breathing wall, so that the depth stays
+  honestly unknown (an untold lateral wall speed v under a shaft turning at rate w
+  looks like a depth error v / w). A record without motion means a still wall.
+- The stiffness is learnt only while it can be seen, above a force: at zero force
+  K multiplies an offset that is mostly noise and would drift to its half. Below,
+  it is *considered* (Schmidt): it widens the covariance and is not touched.
+- A jump of the wall shows as two unlikely samples in a row. The first is coasted
+  over, the second opens the mean's covariance, and only the mean is updated.
+"""
+
+from math import exp, hypot, log, pi, sqrt
+
+import numpy as np
+
+from systems.passive_wrist.breathing_rate import BreathingFit, find_breathing
+from systems.passive_wrist.fulcrum_filter import FulcrumFilter, FulcrumParams, Sample
+
+BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0  # phases
+_RECORD = 120  # entries of the record
+_RECORD_PERIOD = 0.1  # [s]
+_CHECK = 3  # entries between two looks for the breathing
+_SHORTEST = 28  # entries before the first look
+_STILL = 50  # entries without motion that make a still wall
+_UNLIKELY = 30.0  # normalised innovation squared of a jump
+_EXPECTED = 1.5  # smoothed innovations up to which the wall is understood
+_GUARD = 0.1  # s after a jump in which only the mean is updated
+
+
+class FulcrumTracker:
+    """The estimator over plain arrays; all it remembers is the vector `z`.
+
+    Layout of z: x (n), P (n n), the record (120 x 13: mean p_WS, u, f, m and weight
+    of the angle of a tenth of a second), the sums for its next entry (13), and the scalars `AUX`.
+
+    Attributes:
+        filter: Prediction and updates.
+        size: Length of z.
+    """
+
+    AUX = (
+        "phase",
+        "steps",  # updates so far
+        "unlikely",  # unlikely samples in a row
+        "guard",  # s left after a jump
+        "nis",  # smoothed normalised innovation squared / 4, 1 = as expected
+        "recorded",  # entries of the record
+        "agreed",  # looks in a row that found the same rate
+        "found",  # that rate, in Hz
+        "jumps",  # jumps followed so far
+        "refused",  # estimates refused so far
+        "force",  # lateral force of the last sample, in N
+        "amplitude",  # rms of the breathing sideways when it was found, in m
+        "summed",  # samples in the sums
+    )
+
+    def __init__(self, params: FulcrumParams) -> None:
+        self.filter = FulcrumFilter(params)
+        self.p = params
+        n = self.filter.n
+        self._record = n + n * n
+        self._sums = self._record + 13 * _RECORD
+        self._aux = self._sums + 13
+        self.size = self._aux + len(self.AUX)
+        self._every = max(1, round(_RECORD_PERIOD / params.period))
+
+    def initial(self) -> np.ndarray:
+        """The state before the first sample, shape (size,)."""
+        x, P = self.filter.prior()
+        z = np.zeros(self.size)
+        z[: self.filter.n], z[self.filter.n : self._record] = x, P.reshape(-1)
+        z[self.at("nis")] = 1.0
+        return z
+
+    def at(self, name: str) -> int:
+        """Index in z of a scalar named in `AUX`."""
+        return self._aux + self.AUX.index(name)
+
+    def mean(self, z: np.ndarray) -> np.ndarray:
+        """The filter's state x, a view into z."""
+        return z[: self.filter.n]
+
+    def covariance(self, z: np.ndarray) -> np.ndarray:
+        """Covariance (3, 3) of the fulcrum at the last update, in m^2.
+
+        The sensor's slow bias shifts the estimate sideways however long one
+        averages, so its share is added here.
+        """
+        n, total = self.filter.n, self.filter.total
+        P = total @ z[n : self._record].reshape(n, n) @ total.T
+        bias = self.p.force_bias * 0.5 / exp(z[n - 1])
+        P[(0, 1, 2), (0, 1, 2)] += bias**2
+        return P
+
+    def stiffness(self, z: np.ndarray) -> tuple[float, float]:
+        """Believed stiffness in N/m and the standard deviation of its logarithm."""
+        n = self.filter.n
+        return exp(z[n - 1]), sqrt(z[self._record - 1])
+
+    def breathing(self, z: np.ndarray) -> float:
+        """Rate in Hz; zero while there is no breathing to see."""
+        if z[self.at("phase")] < BREATHING or z[self.at("amplitude")] < 3e-4:
+            return 0.0
+        return exp(z[self.filter.n - 2]) / (2.0 * pi)
+
+    def ahead(self, z: np.ndarray, time: float) -> tuple[list[float], list[float]]:
+        """Fulcrum and its velocity `time` s after the last update."""
+        return self.filter.ahead(z[: self.filter.n], time)
+
+    def step(self, z: np.ndarray, sample: Sample) -> np.ndarray:
+        """One update; `z` is not changed, the new state is returned."""
+        z = z.copy()
+        p, f = self.p, self.filter
+        n = f.n
+        x, aux = z[:n], z[self._aux :]
+        P = z[n : self._record].reshape(n, n)
+        force = aux[10] = hypot(sample.z[0], sample.z[1])
+        aux[1] += 1.0
+        if aux[0] == BEFORE:
+            f.to_first_force(x, P, sample)
+            aux[0] = FOLLOWING
+            return z
+        guard = aux[3] > 0.0
+        known = aux[0] == BREATHING
+        walk = p.still_walk * min(max(aux[4], 1.0), 10.0) if known else p.wall_walk
+        if guard:
+            aux[3] -= p.period
+            walk = 0.05  # the rest of a jump that takes more than two samples
+        f.predict(x, P, p.period, walk, self._amplitude_walk(z) if known else 0.0)
+        i = f.innovate(x, P, sample)
+        nis = i.nis
+        if nis > _UNLIKELY and not guard:
+            aux[2] += 1.0
+            if aux[2] < 2.0:
+                return z  # coasted over: one unlikely sample
+            size = 1.5 * hypot(i.y[0], i.y[1]) / exp(x[n - 1])
+            f.jump(x, P, sample, min(0.02, size))
+            aux[2], aux[3], aux[5], aux[8] = 0.0, _GUARD, 0.0, aux[8] + 1.0
+        else:
+            aux[2] = 0.0
+            aux[4] += 0.02 * (min(nis, 60.0) / 4.0 - aux[4])
+            f.update(x, P, i, 3 if guard else n if force > p.learn_above else n - 1)
+        self._remember(z, sample, i.w)
+        far = f.total.dot(x) - p.guess
+        if float(far.dot(far)) > p.neighbourhood**2:  # refused: starts anew
+            aux[9] += 1.0
+            aux[0], aux[3], aux[5], aux[6] = FOLLOWING, 0.0, 0.0, 0.0
+            x[:3], x[3 : n - 2] = p.guess, 0.0
+            P[: n - 1, :] = P[:, : n - 1] = 0.0
+            f.to_first_force(x, P, sample)
+        return z
+
+    def _amplitude_walk(self, z: np.ndarray) -> float:
+        amplitude = float(z[self.at("amplitude")])
+        return self.p.amplitude_walk * min(max(amplitude / 3.5e-3, 0.1), 2.0)
+
+    def _remember(self, z: np.ndarray, a: Sample, w: list[float]) -> None:
+        """Adds a sample to the record and looks for the breathing in it."""
+        sums = z[self._sums : self._aux]
+        # The damping's part is taken out now: later the velocities are gone.
+        d1 = a.damping * sum(w[k] * a.e1[k] for k in (0, 1, 2))
+        d2 = a.damping * sum(w[k] * a.e2[k] for k in (0, 1, 2))
+        f1, f2 = a.z[0] - d1, a.z[1] - d2
+        depth = sum(a.u[k] * (z[k] - a.p_WS[k]) for k in (0, 1, 2))
+        m1, m2 = a.z[2] + depth * d2, a.z[3] - depth * d1
+        e1, e2 = a.e1, a.e2
+        sums += [
+            *a.p_WS,
+            *a.u,
+            *(f1 * e1[k] + f2 * e2[k] for k in (0, 1, 2)),
+            *(m1 * e1[k] + m2 * e2[k] for k in (0, 1, 2)),
+            a.turning,
+        ]
+        aux = z[self._aux :]
+        aux[12] += 1.0
+        if aux[1] % self._every != 0.0:
+            return
+        record = z[self._record : self._sums].reshape(_RECORD, 13)
+        record[:-1] = record[1:]
+        record[-1] = sums / aux[12]
+        sums[:], aux[12] = 0.0, 0.0
+        aux[5] = min(aux[5] + 1.0, _RECORD)
+        entries = aux[1] // self._every
+        understood = aux[0] == BREATHING and aux[4] < _EXPECTED
+        if aux[5] >= _SHORTEST and entries % _CHECK == 0.0 and not understood:
+            self._look(z, record[_RECORD - int(aux[5]) :])
+
+    def _look(self, z: np.ndarray, record: np.ndarray) -> None:
+        """Looks for the breathing, or for a still wall, in the record."""
+        n, aux = self.filter.n, z[self._aux :]
+        x = z[:n]
+        stiffness = exp(x[n - 1])
+        p_WS, u, f = record[:, 0:3], record[:, 3:6], record[:, 6:9]
+        depth = ((x[:3] - p_WS) * u).sum(axis=1)
+        lateral = p_WS + depth[:, None] * u + f / stiffness
+        noise = self.p.force_noise / sqrt(self._every) / stiffness
+        fit = find_breathing(lateral, _RECORD_PERIOD)
+        known = aux[0] == BREATHING
+        if fit is None or fit.amplitude < max(2e-4, 3.0 * noise, 2.0 * fit.residual):
+            aux[6] = 0.0
+            moved = float(np.sqrt(lateral.var(axis=0).sum()))
+            still = moved < max(2e-4, 3.0 * noise)
+            if not known and len(record) >= _STILL and still:
+                self._filter_again(z, record, None, moved)
+            return
+        agrees = abs(fit.rate / aux[7] - 1.0) < 0.06 if aux[7] > 0.0 else False
+        aux[6] = aux[6] + 1.0 if agrees else 1.0
+        aux[7] = fit.rate
+        wrong = abs(log(2.0 * pi * fit.rate) - x[n - 2]) > 0.1 or self.breathing(z) == 0
+        if aux[6] >= 2.0 and (not known or wrong):
+            self._filter_again(z, record, fit, fit.amplitude)
+
+    def _filter_again(
+        self,
+        z: np.ndarray,
+        record: np.ndarray,
+        fit: BreathingFit | None,
+        amplitude: float,
+    ) -> None:
+        """Filters the record again, now with the breathing's rate."""
+        f, p, n = self.filter, self.p, self.filter.n
+        aux = z[self._aux :]
+        x, P = f.prior()
+        old = z[n : self._record].reshape(n, n)
+        x[n - 1], P[n - 1, n - 1] = z[n - 1], old[n - 1, n - 1]
+        x[:3] = z[:3] if aux[0] == BREATHING else p.guess
+        x[n - 2] = log(2.0 * pi * (fit.rate if fit else 0.25))
+        P[n - 2, n - 2] = 0.05**2
+        f.to_first_force(x, P, self._entry(record[0]))
+        u = record[0, 3:6]
+        U = np.outer(u, u)
+        for k, i in enumerate(f.parts, 1):
+            side = (1.5 * max(amplitude, 1e-4) / k) ** 2
+            spread = side * (np.eye(3) - U) + p.axial_ratio**2 * side * U
+            P[i : i + 3, i : i + 3] = P[i + 3 : i + 6, i + 3 : i + 6] = spread
+            P[:3, :3] += spread  # the first sample was taken somewhere in the wave
+        aux[11] = amplitude
+        walk = self._amplitude_walk(z)
+        for row in record[1:]:
+            f.predict(x, P, _RECORD_PERIOD, p.still_walk, walk)
+            f.update(x, P, f.innovate(x, P, self._entry(row)), n - 1)
+        z[:n], z[n : self._record] = x, P.reshape(-1)
+        f.predict(
+            z[:n], z[n : self._record].reshape(n, n), 0.5 * _RECORD_PERIOD, 0.0, walk
+        )
+        aux[0], aux[4], aux[6] = BREATHING, 1.0, 0.0
+
+    def _entry(self, row: np.ndarray) -> Sample:
+        still = [0.0, 0.0, 0.0]
+        v = row.tolist()
+        u = v[3:6]
+        size = sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2)
+        u = [q / size for q in u]
+        return Sample(v[0:3], u, still, still, v[6:9], v[9:12], 0.0, self._every, v[12])

@@ -1,0 +1,85 @@
+"""The wall's spring as the wrist's sensor sees it (paper section 3, Figure 3).
+
+A straight shaft leaves the sensor's origin S along the unit vector u. The wall
+pulls the shaft towards the true fulcrum I; the sleeve slides to the foot of the
+perpendicular from I, so the contact lies at p_C = p_S + lambda u with
+
+    lambda = u . (p_I - p_S),
+    f = K P (p_I - p_S) + D P (v_I - v_S - lambda du/dt),   P = 1 - u u^T,
+    m = lambda u x f                                  (about the sensor's origin).
+
+Only the four lateral components carry information. With a lateral basis e1, e2
+= u x e1 they are z = (f1, f2, m1, m2) with m1 = -lambda f2, m2 = lambda f1.
+Everything here is in plain floats: it runs at every control step.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+
+type Vector = Sequence[float]
+
+
+def lateral_basis(u: Vector) -> tuple[list[float], list[float]]:
+    """Two unit vectors e1, e2 = u x e1 across a unit vector u (3)."""
+    x, y, z = u
+    if abs(x) < 0.8:  # across the world's x axis, unless u is close to it
+        n = sqrt(y * y + z * z)
+        e1 = [0.0, z / n, -y / n]
+    else:
+        n = sqrt(x * x + z * z)
+        e1 = [-z / n, 0.0, x / n]
+    a, b, c = e1
+    return e1, [y * c - z * b, z * a - x * c, x * b - y * a]
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """The inner product of two 3-vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def lateral_wrench(
+    r: Vector,
+    w: Vector,
+    u: Vector,
+    e1: Vector,
+    e2: Vector,
+    stiffness: float,
+    damping: float,
+) -> tuple[float, float, float, float, float]:
+    """What the sensor should read laterally.
+
+    Args:
+        r: p_I - p_S, fulcrum from the sensor's origin, in m.
+        w: v_I - v_S - lambda du/dt, wall against shaft at the contact, in m/s.
+        u: Shaft's unit vector.
+        e1: Lateral basis.
+        e2: Lateral basis.
+        stiffness: K in N/m.
+        damping: D in N s/m.
+
+    Returns:
+        f1, f2 in N, m1, m2 in N m, lambda in m.
+    """
+    depth = dot(u, r)
+    f1 = stiffness * dot(e1, r) + damping * dot(e1, w)
+    f2 = stiffness * dot(e2, r) + damping * dot(e2, w)
+    return f1, f2, -depth * f2, depth * f1, depth
+
+
+def lateral_jacobian(
+    f1: float,
+    f2: float,
+    depth: float,
+    u: Vector,
+    e1: Vector,
+    e2: Vector,
+    stiffness: float,
+) -> list[list[float]]:
+    """Derivative (4, 3) of (f1, f2, m1, m2) by p_I, without the damping's part."""
+    k, kd = stiffness, stiffness * depth
+    return [
+        [k * e1[0], k * e1[1], k * e1[2]],
+        [k * e2[0], k * e2[1], k * e2[2]],
+        [-f2 * u[i] - kd * e2[i] for i in (0, 1, 2)],
+        [f1 * u[i] + kd * e1[i] for i in (0, 1, 2)],
+    ]
