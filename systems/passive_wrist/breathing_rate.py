@@ -16,39 +16,34 @@ import numpy as np
 RATES = np.geomspace(0.10, 0.50, 61)  # [Hz] the grid, 2.7 % apart
 _NEARLY = 1.6  # residual power against the best one's
 _ENOUGH = 0.02  # residual power against the record's: the grid is coarse
-_HARMONICS = 2
+_SEARCHED = 2  # harmonics of the search
 
 
 @dataclass
 class BreathingFit:
-    """A periodic motion fitted to a record; all vectors in W, at its last sample.
-
-    The wave is mean + sum_k (cosine_k cos(k w t) - sine_k sin(k w t)), t = 0 at
-    the last sample.
+    """A periodic motion fitted to a record.
 
     Attributes:
         rate: In Hz.
-        mean: Shape (3,), in m.
-        cosine: Shape (2, 3), in m.
-        sine: Shape (2, 3), in m.
+        parts: Rms of each harmonic, shape (harmonics,), in m.
         amplitude: Rms of the fitted wave about its mean, in m.
         residual: Rms of what the fit leaves, in m.
     """
 
     rate: float
-    mean: np.ndarray
-    cosine: np.ndarray
-    sine: np.ndarray
+    parts: np.ndarray
     amplitude: float
     residual: float
 
 
-def _basis(rate: np.ndarray, samples: int, period: float) -> np.ndarray:
-    """Columns 1, cos, -sin, ... for each rate, shape (rates, samples, 5)."""
+def _basis(
+    rate: np.ndarray, samples: int, period: float, harmonics: int
+) -> np.ndarray:
+    """Columns 1, cos, -sin, ... for each rate, shape (rates, samples, 1 + 2 h)."""
     t = (np.arange(samples) - (samples - 1)) * period
     phase = 2.0 * np.pi * rate[:, None] * t
     columns = [np.ones_like(phase)]
-    for k in range(1, _HARMONICS + 1):
+    for k in range(1, harmonics + 1):
         columns += [np.cos(k * phase), -np.sin(k * phase)]
     return np.stack(columns, axis=-1)
 
@@ -60,15 +55,18 @@ def _orthonormal(samples: int, period: float) -> tuple[np.ndarray, np.ndarray]:
     rates = RATES[RATES * length >= 0.5]
     if not len(rates):
         return rates, np.zeros((0, samples, 1))
-    return rates, np.linalg.qr(_basis(rates, samples, period))[0]
+    return rates, np.linalg.qr(_basis(rates, samples, period, _SEARCHED))[0]
 
 
-def find_breathing(record: np.ndarray, period: float) -> BreathingFit | None:
+def find_breathing(
+    record: np.ndarray, period: float, harmonics: int
+) -> BreathingFit | None:
     """Fits a periodic motion to a record.
 
     Args:
         record: Positions, oldest first, shape (n, 3), in m.
         period: Between samples, in s.
+        harmonics: Of the wave that is fitted at the rate found.
 
     Returns:
         The fit, or None if the record is shorter than one period of it or than
@@ -94,15 +92,14 @@ def find_breathing(record: np.ndarray, period: float) -> BreathingFit | None:
     bend = before - 2.0 * at + after
     shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
     rate = float(rates[i] * (rates[i + 1] / rates[i]) ** shift)
-    basis = _basis(np.array([rate]), samples, period)[0]
+    basis = _basis(np.array([rate]), samples, period, harmonics)[0]
     x, *_ = np.linalg.lstsq(basis, record, rcond=None)
     fitted = basis[:, 1:] @ x[1:]
     rest = record - x[0] - fitted
+    squares = (x[1:] ** 2).sum(axis=1)
     return BreathingFit(
         rate=rate,
-        mean=x[0],
-        cosine=x[1::2],
-        sine=x[2::2],
+        parts=np.sqrt(0.5 * (squares[0::2] + squares[1::2])),
         amplitude=float(np.sqrt((fitted**2).sum() / samples)),
         residual=float(np.sqrt((rest**2).sum() / samples)),
     )

@@ -47,9 +47,9 @@ class FulcrumParams:
         length: From the sensor's origin to the tip, in m.
         still_walk: Random walk of the mean once breathing is known, m/sqrt(s).
         wall_walk: The same before that: it has to follow a breathing wall.
-        amplitude_walk: Random walk of the harmonics' parts, in m/sqrt(s), at an
-            amplitude of 5 mm; it goes with the amplitude.
-        axial_ratio: Prior of the unseen axial amplitude over the lateral one.
+        amplitude_walk: Random walk of a harmonic's parts over its own rms, in
+            1/sqrt(s).
+        axial_ratio: Prior of the unseen axial breathing over the lateral one.
         neighbourhood: The fulcrum is never farther from the guess, in m.
         period: Of the updates, in s.
     """
@@ -69,9 +69,9 @@ class FulcrumParams:
     depth_above: float = 0.25
     depth_speed: float = 4e-3
     length: float = 0.4
-    still_walk: float = 2e-4
+    still_walk: float = 1e-4
     wall_walk: float = 5e-3
-    amplitude_walk: float = 3e-4
+    amplitude_walk: float = 0.03
     axial_ratio: float = 2.0
     neighbourhood: float = 0.06
     period: float = 1.0 / 120.0
@@ -245,12 +245,20 @@ class FulcrumFilter:
         P: np.ndarray,
         dt: float,
         walk: float,
-        amplitude_walk: float,
+        part_walks: list[float],
     ) -> None:
-        """Moves (x, P) by dt; walks in m/sqrt(s), amplitude_walk 0: no breathing."""
+        """Moves (x, P) by dt.
+
+        Args:
+            x: State, changed in place.
+            P: Its covariance, changed in place.
+            dt: In s.
+            walk: Random walk of the mean, in m/sqrt(s).
+            part_walks: The same of each harmonic; empty before breathing is known.
+        """
         n = self.n
         diagonal = P.reshape(-1)[:: n + 1]
-        if amplitude_walk > 0.0:
+        if part_walks:
             F = np.eye(n)
             flat = F.reshape(-1)
             step = n + 1
@@ -265,7 +273,8 @@ class FulcrumFilter:
                 F[i : i + 3, n - 2] = -k * theta * x[i + 3 : i + 6]
                 F[i + 3 : i + 6, n - 2] = k * theta * x[i : i + 3]
             P[:] = F.dot(P).dot(F.T)
-            diagonal[3 : n - 2] += amplitude_walk**2 * dt
+            for i, part in zip(self.parts, part_walks, strict=True):
+                diagonal[i : i + 6] += part**2 * dt
             diagonal[n - 2] += 1e-4 * dt
         diagonal[0:3] += walk**2 * dt
         diagonal[n - 1] += 1e-4 * dt

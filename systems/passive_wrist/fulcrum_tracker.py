@@ -38,7 +38,8 @@ class FulcrumTracker:
     """The estimator over plain arrays; all it remembers is the vector `z`.
 
     Layout of z: x (n), P (n n), the record (120 x 13: mean p_WS, u, f, m and weight
-    of the angle of a tenth of a second), the sums for its next entry (13), and the scalars `AUX`.
+    of the angle of a tenth of a second), the sums for its next entry (13), the scalars `AUX` and each harmonic's
+    rms in m when the breathing was found.
 
     Attributes:
         filter: Prediction and updates.
@@ -57,7 +58,7 @@ class FulcrumTracker:
         "jumps",  # jumps followed so far
         "refused",  # estimates refused so far
         "force",  # lateral force of the last sample, in N
-        "amplitude",  # rms of the breathing sideways when it was found, in m
+        "walk",  # of the mean, from what the breathing's fit left, in m/sqrt(s)
         "summed",  # samples in the sums
     )
 
@@ -68,7 +69,8 @@ class FulcrumTracker:
         self._record = n + n * n
         self._sums = self._record + 13 * _RECORD
         self._aux = self._sums + 13
-        self.size = self._aux + len(self.AUX)
+        self._parts = self._aux + len(self.AUX)
+        self.size = self._parts + params.harmonics
         self._every = max(1, round(_RECORD_PERIOD / params.period))
 
     def initial(self) -> np.ndarray:
@@ -106,7 +108,7 @@ class FulcrumTracker:
 
     def breathing(self, z: np.ndarray) -> float:
         """Rate in Hz; zero while there is no breathing to see."""
-        if z[self.at("phase")] < BREATHING or z[self.at("amplitude")] < 3e-4:
+        if z[self.at("phase")] < BREATHING or z[self._parts] < 2e-4:
             return 0.0
         return exp(z[self.filter.n - 2]) / (2.0 * pi)
 
@@ -119,7 +121,7 @@ class FulcrumTracker:
         z = z.copy()
         p, f = self.p, self.filter
         n = f.n
-        x, aux = z[:n], z[self._aux :]
+        x, aux = z[:n], z[self._aux : self._parts]
         P = z[n : self._record].reshape(n, n)
         force = aux[10] = hypot(sample.z[0], sample.z[1])
         aux[1] += 1.0
@@ -129,11 +131,11 @@ class FulcrumTracker:
             return z
         guard = aux[3] > 0.0
         known = aux[0] == BREATHING
-        walk = p.still_walk * min(max(aux[4], 1.0), 10.0) if known else p.wall_walk
+        walk = aux[11] * min(max(aux[4], 1.0), 10.0) if known else p.wall_walk
         if guard:
             aux[3] -= p.period
             walk = 0.05  # the rest of a jump that takes more than two samples
-        f.predict(x, P, p.period, walk, self._amplitude_walk(z) if known else 0.0)
+        f.predict(x, P, p.period, walk, self._part_walks(z) if known else [])
         i = f.innovate(x, P, sample)
         nis = i.nis
         if nis > _UNLIKELY and not guard:
@@ -157,9 +159,9 @@ class FulcrumTracker:
             f.to_first_force(x, P, sample)
         return z
 
-    def _amplitude_walk(self, z: np.ndarray) -> float:
-        amplitude = float(z[self.at("amplitude")])
-        return self.p.amplitude_walk * min(max(amplitude / 3.5e-3, 0.1), 2.0)
+    def _part_walks(self, z: np.ndarray) -> list[float]:
+        rate = self.p.amplitude_walk
+        return [rate * max(a, 3e-4) for a in z[self._parts :].tolist()]
 
     def _remember(self, z: np.ndarray, a: Sample, w: list[float]) -> None:
         """Adds a sample to the record and looks for the breathing in it."""
@@ -178,7 +180,7 @@ class FulcrumTracker:
             *(m1 * e1[k] + m2 * e2[k] for k in (0, 1, 2)),
             a.turning,
         ]
-        aux = z[self._aux :]
+        aux = z[self._aux : self._parts]
         aux[12] += 1.0
         if aux[1] % self._every != 0.0:
             return
@@ -194,39 +196,39 @@ class FulcrumTracker:
 
     def _look(self, z: np.ndarray, record: np.ndarray) -> None:
         """Looks for the breathing, or for a still wall, in the record."""
-        n, aux = self.filter.n, z[self._aux :]
+        n, p, aux = self.filter.n, self.p, z[self._aux : self._parts]
         x = z[:n]
         stiffness = exp(x[n - 1])
         p_WS, u, f = record[:, 0:3], record[:, 3:6], record[:, 6:9]
         depth = ((x[:3] - p_WS) * u).sum(axis=1)
         lateral = p_WS + depth[:, None] * u + f / stiffness
-        noise = self.p.force_noise / sqrt(self._every) / stiffness
-        fit = find_breathing(lateral, _RECORD_PERIOD)
+        noise = p.force_noise / sqrt(self._every) / stiffness
+        fit = find_breathing(lateral, _RECORD_PERIOD, p.harmonics)
         known = aux[0] == BREATHING
         if fit is None or fit.amplitude < max(2e-4, 3.0 * noise, 2.0 * fit.residual):
             aux[6] = 0.0
             moved = float(np.sqrt(lateral.var(axis=0).sum()))
             still = moved < max(2e-4, 3.0 * noise)
             if not known and len(record) >= _STILL and still:
-                self._filter_again(z, record, None, moved)
+                self._filter_again(z, record, None, noise)
             return
         agrees = abs(fit.rate / aux[7] - 1.0) < 0.06 if aux[7] > 0.0 else False
         aux[6] = aux[6] + 1.0 if agrees else 1.0
         aux[7] = fit.rate
         wrong = abs(log(2.0 * pi * fit.rate) - x[n - 2]) > 0.1 or self.breathing(z) == 0
         if aux[6] >= 2.0 and (not known or wrong):
-            self._filter_again(z, record, fit, fit.amplitude)
+            self._filter_again(z, record, fit, noise)
 
     def _filter_again(
         self,
         z: np.ndarray,
         record: np.ndarray,
         fit: BreathingFit | None,
-        amplitude: float,
+        noise: float,
     ) -> None:
         """Filters the record again, now with the breathing's rate."""
         f, p, n = self.filter, self.p, self.filter.n
-        aux = z[self._aux :]
+        aux = z[self._aux : self._parts]
         x, P = f.prior()
         old = z[n : self._record].reshape(n, n)
         x[n - 1], P[n - 1, n - 1] = z[n - 1], old[n - 1, n - 1]
@@ -236,19 +238,24 @@ class FulcrumTracker:
         f.to_first_force(x, P, self._entry(record[0]))
         u = record[0, 3:6]
         U = np.outer(u, u)
-        for k, i in enumerate(f.parts, 1):
-            side = (1.5 * max(amplitude, 1e-4) / k) ** 2
+        z[self._parts :] = fit.parts if fit else 0.0
+        for k, i in enumerate(f.parts):
+            side = (1.5 * z[self._parts + k]) ** 2 + 1e-8
             spread = side * (np.eye(3) - U) + p.axial_ratio**2 * side * U
             P[i : i + 3, i : i + 3] = P[i + 3 : i + 6, i + 3 : i + 6] = spread
             P[:3, :3] += spread  # the first sample was taken somewhere in the wave
-        aux[11] = amplitude
-        walk = self._amplitude_walk(z)
+        # What the harmonics miss of the wave, as a walk that wanders as far in the
+        # time of the first harmonic left out.
+        left = max(fit.residual**2 - 2.0 * noise**2, 0.0) if fit else 0.0
+        omega = 2.0 * pi * (fit.rate if fit else 0.0) * (p.harmonics + 1)
+        aux[11] = sqrt(p.still_walk**2 + 2.0 * omega * left)
+        walks = self._part_walks(z)
         for row in record[1:]:
-            f.predict(x, P, _RECORD_PERIOD, p.still_walk, walk)
+            f.predict(x, P, _RECORD_PERIOD, aux[11], walks)
             f.update(x, P, f.innovate(x, P, self._entry(row)), n - 1)
         z[:n], z[n : self._record] = x, P.reshape(-1)
         f.predict(
-            z[:n], z[n : self._record].reshape(n, n), 0.5 * _RECORD_PERIOD, 0.0, walk
+            z[:n], z[n : self._record].reshape(n, n), 0.5 * _RECORD_PERIOD, 0.0, walks
         )
         aux[0], aux[4], aux[6] = BREATHING, 1.0, 0.0
 
