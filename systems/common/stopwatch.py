@@ -1,42 +1,63 @@
-"""Where the controllers' wall time goes: one row for every update of a block."""
+"""Where the controllers' wall time goes: one row for every call into a block."""
 
 from collections import defaultdict
 import statistics
+from time import perf_counter
 
 
 class Stopwatch:
-    """Collects the wall time of block updates.
+    """Collects the wall time of block updates and outputs.
 
-    It only observes: nothing a block computes depends on it.
+    A call that pulls other blocks' outputs contains their work, so only the
+    outermost call is counted: the rows of one instant add up to the work of
+    all blocks, whoever asked first. It only observes: nothing a block computes
+    depends on it.
 
     Attributes:
-        rows: (block name, simulated time in s, wall time in s), in call order.
+        rows: (block name, simulated time in s, wall time in s, whether it was an
+            update), in call order.
     """
 
     def __init__(self) -> None:
-        self.rows: list[tuple[str, float, float]] = []
+        self.rows: list[tuple[str, float, float, bool]] = []
+        self._start: float | None = None
 
     def reset(self) -> None:
         """Forgets all rows."""
         self.rows = []
+        self._start = None
 
-    def per_instant(self) -> dict[float, float]:
-        """Wall time in s of all blocks together, by control instant."""
+    def begin(self) -> bool:
+        """Starts a call; False if it is inside another one."""
+        if self._start is not None:
+            return False
+        self._start = perf_counter()
+        return True
+
+    def end(self, name: str, time: float, is_update: bool = False) -> None:
+        """Ends the outermost call of block `name` at simulated `time`."""
+        if self._start is not None:
+            wall = perf_counter() - self._start
+            self.rows.append((name, time, wall, is_update))
+            self._start = None
+
+    def whole_instants(self, controller: str) -> list[float]:
+        """Wall time in s of all blocks at each instant `controller` updated in."""
         total: dict[float, float] = defaultdict(float)
-        for _, time, wall in self.rows:
+        whole: set[float] = set()
+        for name, time, wall, is_update in self.rows:
             total[time] += wall
-        return dict(total)
+            if is_update and name == controller:
+                whole.add(time)
+        return [wall for time, wall in total.items() if time in whole]
 
     def per_block(self) -> dict[str, float]:
-        """Median wall time in s of one update, by block.
-
-        An update that pulls other blocks' outputs is charged with their work.
-        """
-        walls: dict[str, list[float]] = defaultdict(list)
-        for name, _, wall in self.rows:
-            walls[name].append(wall)
-        return {name: statistics.median(w) for name, w in walls.items()}
+        """Median wall time in s of a block's outermost calls in one instant."""
+        walls: dict[str, dict[float, float]] = defaultdict(lambda: defaultdict(float))
+        for name, time, wall, _ in self.rows:
+            walls[name][time] += wall
+        return {name: statistics.median(w.values()) for name, w in walls.items()}
 
 
 STOPWATCH = Stopwatch()
-"""The process's one stopwatch; `diagrams.common.run` resets it before a run."""
+"""The process's one stopwatch; a run resets it when it begins."""

@@ -1,0 +1,149 @@
+"""The command line: `trocar`, or `python -m diagrams`."""
+
+import argparse
+from collections.abc import Callable, Sequence
+import logging
+from pathlib import Path
+import sys
+
+from tqdm import tqdm
+
+from diagrams.common.scenario import (
+    ScenarioError,
+    load_scenario,
+    read_tree,
+    scenario_files,
+)
+
+EXAMPLES = """\
+examples:
+  trocar scenarios                          what there is to run
+  trocar run gauze_dynamic                  results in out/gauze_dynamic
+  trocar run gauze_static --set go_to_target.form=printed --out out/printed
+  trocar run out/gauze_dynamic/scenario.yaml --seed 7
+  trocar diagram gauze_static               the block diagram as a picture
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the command line."""
+    parser = argparse.ArgumentParser(
+        prog="trocar",
+        description="An open testbed for autonomous keyhole surgery on Drake.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands.add_parser("scenarios", help="list the scenarios, one line each")
+    run = commands.add_parser(
+        "run",
+        help="run a scenario and write figures, plots, log and replay",
+        description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
+        "PNG, replay.html and scenario.yaml (exactly what ran) into DIR.",
+    )
+    run.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    run.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
+    run.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    run.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY.SUB=VALUE",
+        help="change a value of the scenario, e.g. abdomen.stiffness=800; repeatable",
+    )
+    run.add_argument("--duration", type=float, metavar="S", help="simulated seconds")
+    run.add_argument(
+        "--no-replay", action="store_true", help="do not record replay.html"
+    )
+    draw = commands.add_parser("diagram", help="draw a scenario's block diagram")
+    draw.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    draw.add_argument(
+        "--out", metavar="FILE", type=Path, help="SVG or PNG; default: out/NAME.svg"
+    )
+    return parser
+
+
+def list_scenarios() -> None:
+    """Prints every scenario's name and description."""
+    files = scenario_files()
+    width = max(map(len, files), default=0)
+    for name, path in files.items():
+        print(f"{name:<{width}}  {read_tree(path).get('description', '')}")
+
+
+def default_name(name: str) -> str:
+    """The results' name: a scenario's own, or that of its file's folder."""
+    path = Path(name)
+    if path.suffix and path.stem == "scenario":
+        return f"{path.resolve().parent.name}_again"
+    return path.stem
+
+
+def make_progress(duration: float) -> tuple[Callable[[float], None], tqdm]:
+    """A progress bar on a terminal's standard error; silent in a pipe."""
+    bar = tqdm(
+        total=round(duration, 3),
+        unit="s",
+        disable=not sys.stderr.isatty(),
+        bar_format="{l_bar}{bar}| {n:.1f}/{total:.1f} simulated s [{elapsed}]",
+    )
+
+    def advance(time: float) -> None:
+        bar.update(time - bar.n)
+
+    return advance, bar
+
+
+def run_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar run`."""
+    from diagrams.common.metrics import table
+    from diagrams.common.run import run_scenario
+
+    scenario = load_scenario(
+        arguments.name, arguments.overrides, arguments.seed, arguments.duration
+    )
+    out = arguments.out or Path("out") / default_name(arguments.name)
+    progress, bar = make_progress(scenario.duration)
+    with bar:
+        run = run_scenario(scenario, out, not arguments.no_replay, progress)
+    if run.metrics:
+        print(table(run.metrics))
+    replay = "replay.html, " if not arguments.no_replay else ""
+    print(f"\n{replay}metrics.json, signals.csv, scenario.yaml and plots: {out}/")
+    if run.error:
+        print(f"trocar: the run ended early at {run.simulated:.3f} s: {run.error}")
+        return 1
+    return 0
+
+
+def diagram_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar diagram`."""
+    from diagrams.common.block_diagram import draw_block_diagram
+    from diagrams.common.study import get_study
+
+    scenario = load_scenario(arguments.name)
+    out = arguments.out or Path("out") / f"{default_name(arguments.name)}.svg"
+    draw_block_diagram(get_study(scenario.system).make_diagram(scenario), out)
+    print(out)
+    return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs the command line.
+
+    Returns:
+        0 when the scenario ran to its end, 1 when it did not, 2 for bad input.
+    """
+    logging.getLogger("drake").setLevel(logging.WARNING)
+    arguments = make_parser().parse_args(argv)
+    try:
+        if arguments.command == "run":
+            return run_command(arguments)
+        if arguments.command == "diagram":
+            return diagram_command(arguments)
+        list_scenarios()
+        return 0
+    except ScenarioError as error:
+        print(f"trocar: error: {error}", file=sys.stderr)
+        return 2

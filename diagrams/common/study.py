@@ -1,0 +1,71 @@
+"""Studies: what the run of a scenario needs to know of its system."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import importlib
+from typing import Any
+
+from diagrams.common.scenario import Scenario, ScenarioError, nearest
+
+STUDIES = {
+    "gauze": "diagrams.gauze.study",
+}
+"""A scenario's `system` and the module whose `STUDY` runs it."""
+
+
+@dataclass(frozen=True)
+class View:
+    """Where the replay looks from: points in the world frame [m]."""
+
+    camera: tuple[float, float, float] = (1.0, -1.0, 0.7)
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Study:
+    """One system that scenarios can run.
+
+    Attributes:
+        name: Its key in `STUDIES`.
+        scenario: The scenario's dataclass.
+        make_diagram: Makes the diagram of a scenario. Exported vector ports named
+            `model.signal` can be logged; an exported port `scene_graph.query`
+            is shown in Meshcat.
+        check: Raises ScenarioError for a scenario that cannot run.
+        measure: The figures of a finished run, flat and in SI units.
+        signals: Exported ports to log: port name to column names. A
+            one-element port's column is the port's name itself.
+        log_period: Period of the log [s], on the control clock.
+        plots: Makes the figures of a run, by file name without ending.
+        decorate: Adds trails, arrows and the like to a recording.
+        controller: Name of the block whose updates mark a whole control instant
+            for `planner_step_median`; empty if there is none.
+        required: Dotted keys that a scenario's file must have.
+        view: The replay's camera.
+        frame_rate: Frames of the replay per simulated second [1/s].
+    """
+
+    name: str
+    scenario: type[Scenario]
+    make_diagram: Callable[[Any], Any]
+    check: Callable[[Any], None]
+    measure: Callable[[Any], dict[str, Any]]
+    signals: dict[str, tuple[str, ...]]
+    log_period: float
+    plots: Callable[[Any], dict[str, Any]]
+    decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
+    controller: str = ""
+    required: tuple[str, ...] = ("system", "duration")
+    view: View = field(default_factory=View)
+    frame_rate: float = 30.0
+
+
+def get_study(name: Any) -> Study:
+    """The study of a name.
+
+    Raises:
+        ScenarioError: If there is none; the nearest name is in the message.
+    """
+    if name not in STUDIES:
+        raise ScenarioError(f"system={name!r}: {nearest(str(name), STUDIES)}")
+    return importlib.import_module(STUDIES[name]).STUDY

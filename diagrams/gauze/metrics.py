@@ -1,0 +1,79 @@
+"""The figures of a gauze delivery, all from true quantities."""
+
+from typing import Any
+
+import numpy as np
+
+from systems.auto_guidance.tool_navigation import REASONS, WAITING
+
+REACHED_DISTANCE = 0.002
+"""The gauze is delivered while the tip is this close to S's true tip [m] ..."""
+REACHED_TIME = 0.5
+"""... for this long [s]."""
+
+
+def spans(flags: np.ndarray) -> list[tuple[int, int]]:
+    """First and last index of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+def time_to_target(time: np.ndarray, tip_error: np.ndarray) -> float | None:
+    """When the tip first came within 2 mm to stay for 0.5 s; None if never."""
+    for first, last in spans(tip_error <= REACHED_DISTANCE):
+        if time[last] - time[first] >= REACHED_TIME - 1e-9:
+            return float(time[first])
+    return None
+
+
+def stops(time: np.ndarray, codes: np.ndarray) -> list[dict[str, Any]]:
+    """Every stop of the robot: reason, start [s] and duration [s].
+
+    Waiting for the tracker's first frame is no stop: the robot has not moved yet.
+    """
+    found = []
+    for code, reason in REASONS.items():
+        if code == WAITING:
+            continue
+        for first, last in spans(np.round(codes) == code):
+            end = time[min(last + 1, len(time) - 1)]
+            start = float(time[first])
+            found.append(
+                {"reason": reason, "start": start, "duration": float(end) - start}
+            )
+    return sorted(found, key=lambda stop: stop["start"])
+
+
+def in_cone(points: np.ndarray, cones: np.ndarray) -> np.ndarray:
+    """Whether each point (n, 3) lies in its view cone (n, 7), shape (n,)."""
+    rays = points - cones[:, :3]
+    cosine = np.einsum("ni,ni->n", rays, cones[:, 3:6]) / np.linalg.norm(rays, axis=1)
+    return np.arccos(np.clip(cosine, -1.0, 1.0)) <= cones[:, 6]
+
+
+def measure(run: Any) -> dict[str, Any]:
+    """The figures of a run, as `metrics.json` keeps them."""
+    time = run.signals["time"]
+    tip = run.matrix("robot.tool")[:, 3:]
+    tip_error = np.linalg.norm(tip - run.matrix("target.shaft")[:, :3], axis=1)
+    clearance = run.matrix("clearance")
+    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+    arrival = time_to_target(time, tip_error)
+    touched = bool(clearance[:, 0].min() <= 0.0)
+    speed = np.linalg.norm(np.gradient(tip, time, axis=0), axis=1)
+    return {
+        "reached": arrival is not None and not touched,
+        "contact": touched,
+        "time_to_target": arrival,
+        "final_tip_error": float(tip_error[-1]),
+        "min_tool_clearance": float(clearance[:, 0].min()),
+        "min_target_clearance": float(clearance[:, 1].min()),
+        "min_camera_clearance": float(clearance[:, 2].min()),
+        "max_lateral_force": float(force.max()),
+        "rms_lateral_force": float(np.sqrt(np.mean(force**2))),
+        "max_fulcrum_error": float(run.signals["wall.fulcrum_error"].max()),
+        "time_in_view": float(in_cone(tip, run.matrix("camera.view_cone")).mean()),
+        "max_speed": float(speed.max()),
+        "joint_limit_time": float(np.mean(run.signals["joints.status"]) * time[-1]),
+        "stops": stops(time, run.signals["navigation.stop"]),
+    }

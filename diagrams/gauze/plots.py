@@ -1,0 +1,170 @@
+"""The paper's Figures 5, 7 and 8 from a run's log."""
+
+from typing import Any
+
+from matplotlib.figure import Figure
+import numpy as np
+
+from diagrams.common.plots import COLORS, add_axes, new_figure
+from systems.common.geometry import closest_points
+
+MM = 1e3
+
+
+def _equal_axes(axes: Any, points: np.ndarray) -> None:
+    """Same scale on all three axes, around the given points (n, 3) [mm]."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = (low + high) / 2, (high - low).max() / 2 + 5.0
+    axes.set(
+        xlim=(middle[0] - half, middle[0] + half),
+        ylim=(middle[1] - half, middle[1] + half),
+        zlim=(middle[2] - half, middle[2] + half),
+        xlabel="x [mm]",
+        ylabel="y [mm]",
+        zlabel="z [mm]",
+    )
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=22, azim=-60)
+
+
+def _shaft(axes: Any, p_WG: np.ndarray, p_WP: np.ndarray, **style: Any) -> None:
+    """One tool from its fulcrum to its tip [mm]."""
+    axes.plot(*np.column_stack([p_WG, p_WP]), solid_capstyle="round", **style)
+
+
+def _fulcrum(run: Any, who: str) -> np.ndarray:
+    """A tool's true fulcrum in W [m], shape (3,)."""
+    return np.array(getattr(run.scenario, who).p_WG)
+
+
+def trajectory(run: Any) -> Figure:
+    """The trajectory in 3-D with both of the surgeon's tools (Figures 7, 8 above)."""
+    figure = new_figure(7.0, 6.0)
+    axes = add_axes(figure, 1, 1, 1, projection="3d")
+    tool = run.matrix("robot.tool") * MM
+    tip, p_WG = tool[:, 3:], tool[0, :3]
+    target = run.matrix("target.shaft")[:, :3] * MM
+    obstacle = run.matrix("obstacle.shaft")[:, :3] * MM
+    p_WGO, p_WGS = _fulcrum(run, "obstacle") * MM, _fulcrum(run, "target") * MM
+    marks = max(1, len(tip) // 60)
+    axes.plot(*tip.T, color=COLORS["robot"], lw=0.8)
+    axes.plot(*tip[::marks].T, "*", color=COLORS["robot"], ms=4, label="robot's tip R")
+    for index in np.linspace(0, len(tip) - 1, 5).astype(int):
+        _shaft(axes, p_WG, tip[index], color=COLORS["robot"], lw=1.5, alpha=0.25)
+        _shaft(axes, p_WGO, obstacle[index], color=COLORS["obstacle"], lw=2, alpha=0.3)
+    _shaft(axes, p_WGO, obstacle[0], color=COLORS["obstacle"], lw=3, label="obstacle O")
+    _shaft(axes, p_WGS, target[-1], color=COLORS["target"], lw=3, label="target S")
+    axes.plot(*obstacle[::marks].T, ".", color=COLORS["obstacle"], ms=3)
+    axes.plot(*target[::marks].T, ".", color=COLORS["target"], ms=3)
+    _equal_axes(axes, np.vstack([tip, target, obstacle, [p_WG, p_WGO, p_WGS]]))
+    axes.legend(loc="upper left")
+    axes.set_title(run.scenario.description)
+    return figure
+
+
+def speeds(run: Any) -> Figure:
+    """Speeds of the guide point over time (Figures 7, 8 below), and the distance."""
+    figure = new_figure(7.0, 5.6)
+    time = run.signals["time"]
+    guide = run.matrix("planner.guide")
+    v_1 = np.linalg.norm(run.matrix("planner.v1"), axis=1)
+    v_R = np.linalg.norm(run.matrix("planner.v_R"), axis=1)
+    # The obstacle's speed where it is closest: its tip's, by the share l/L.
+    v_O = np.linalg.norm(run.matrix("obstacle.tip_velocity"), axis=1) * guide[:, 8]
+    upper = add_axes(figure, 2, 1, 1)
+    upper.plot(time, v_1 * MM, "--", color=COLORS["accent"], label="potential field v1")
+    upper.plot(time, v_R * MM, "-", color=COLORS["robot"], label="commanded v_R")
+    upper.plot(time, v_O * MM, ":", color=COLORS["obstacle"], label="obstacle at M_O")
+    upper.set(ylabel="speed at the guide point [mm/s]", xlim=(0, time[-1]))
+    upper.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    lower = add_axes(figure, 2, 1, 2, sharex=upper)
+    clearance = run.matrix("clearance") * MM
+    error = np.linalg.norm(
+        run.matrix("robot.tool")[:, 3:] - run.matrix("target.shaft")[:, :3], axis=1
+    )
+    lower.plot(time, clearance[:, 0], color=COLORS["obstacle"], label="clearance to O")
+    lower.plot(time, error * MM, color=COLORS["target"], label="tip to S's tip")
+    lower.axhline(0.0, color="k", lw=0.6)
+    for stop in run.metrics["stops"]:
+        for axes in (upper, lower):
+            end = stop["start"] + stop["duration"]
+            axes.axvspan(stop["start"], end, color=COLORS["muted"], alpha=0.35, lw=0)
+    if run.metrics["time_to_target"] is not None:
+        lower.axvline(run.metrics["time_to_target"], color=COLORS["target"], ls="--")
+    lower.set(xlabel="time [s]", ylabel="distance [mm]", ylim=(-3, None))
+    lower.legend(ncols=2, loc="upper right")
+    return figure
+
+
+def forces(run: Any) -> Figure:
+    """Force of the wall on the shaft, and how far the shaft is off the fulcrum."""
+    figure = new_figure(7.0, 4.2)
+    time = run.signals["time"]
+    upper = add_axes(figure, 2, 1, 1)
+    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+    upper.plot(time, force, color=COLORS["obstacle"])
+    upper.set(ylabel="lateral force [N]", xlim=(0, time[-1]), ylim=(0, None))
+    lower = add_axes(figure, 2, 1, 2, sharex=upper)
+    lower.plot(time, run.signals["wall.fulcrum_error"] * MM, color=COLORS["robot"])
+    lower.set(xlabel="time [s]", ylabel="shaft off fulcrum [mm]", ylim=(0, None))
+    return figure
+
+
+def virtual_force(run: Any) -> Figure:
+    """The geometry of the virtual force (Figure 5) where R came closest to O."""
+    figure = new_figure(7.0, 6.0)
+    axes = add_axes(figure, 1, 1, 1, projection="3d")
+    index = int(run.matrix("clearance")[:, 0].argmin())
+    tool = run.matrix("robot.tool")[index] * MM
+    p_WP, p_WG = tool[3:], tool[:3]
+    p_WO = run.matrix("obstacle.shaft")[index, :3] * MM
+    p_WS = run.matrix("target.shaft")[index, :3] * MM
+    p_WGO = _fulcrum(run, "obstacle") * MM
+    M_R, M_O = map(
+        np.array, closest_points(*(x.tolist() for x in (p_WG, p_WP, p_WGO, p_WO)))[3:]
+    )
+    s = np.linalg.norm(M_R - p_WG) / np.linalg.norm(p_WP - p_WG)
+    M_Rf = p_WG + s * (p_WS - p_WG)
+    _shaft(axes, p_WG, p_WP, color=COLORS["robot"], lw=4, label="robot's tool R")
+    _shaft(axes, p_WGO, p_WO, color=COLORS["obstacle"], lw=4, label="obstacle tool O")
+    _shaft(
+        axes, p_WG, p_WS, color=COLORS["target"], lw=1.5, ls="--", label="target line"
+    )
+    _shaft(axes, M_R, M_O, color="k", lw=1.2, ls=":", label="distance rho")
+    v_1 = run.matrix("planner.v1")[index]
+    to_goal = M_Rf - M_R
+    size = 20.0
+    for vector, color, label in (
+        (to_goal, COLORS["target"], "attraction"),
+        (M_R - M_O, COLORS["obstacle"], "repulsion"),
+        (v_1, COLORS["accent"], "v1"),
+    ):
+        length = np.linalg.norm(vector)
+        if length > 1e-9:
+            way = vector / length * size
+            axes.quiver(*M_R, *way, color=color, lw=2, arrow_length_ratio=0.25)
+            axes.text(*(M_R + 1.15 * way), label, color=color)
+    for point, name in (
+        (p_WG, "G_R"),
+        (p_WGO, "G_O"),
+        (M_R, "M_R"),
+        (M_O, "M_O"),
+        (M_Rf, "M_R^f"),
+        (p_WS, "P_S"),
+    ):
+        axes.plot(*point[:, None], "o", color="k", ms=3)
+        axes.text(*point, f"  ${name}$", fontsize=8)
+    _equal_axes(axes, np.vstack([p_WG, p_WP, p_WGO, p_WO, p_WS]))
+    axes.legend(loc="upper left")
+    axes.set_title(f"closest at {run.signals['time'][index]:.2f} s")
+    return figure
+
+
+def plots(run: Any) -> dict[str, Figure]:
+    """All plots of a run, by file name."""
+    return {
+        "trajectory": trajectory(run),
+        "speeds": speeds(run),
+        "forces": forces(run),
+        "virtual_force": virtual_force(run),
+    }

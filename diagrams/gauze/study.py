@@ -1,0 +1,85 @@
+"""The gauze delivery as a study: what is logged, measured, plotted and shown."""
+
+from typing import Any
+
+import numpy as np
+
+from diagrams.common.replay import draw_arrow, draw_trail
+from diagrams.common.study import Study, View
+from diagrams.gauze.diagram import make_gauze_diagram
+from diagrams.gauze.metrics import measure
+from diagrams.gauze.plots import plots
+from diagrams.gauze.scenario import GauzeScenario, check
+
+XYZ = ("x", "y", "z")
+SHAFT = ("tip_x", "tip_y", "tip_z", "u_x", "u_y", "u_z")
+ESTIMATE = (
+    *(f"{part}_{axis}" for part in ("p", "v", "a", "fulcrum") for axis in XYZ),
+    *("sigma_p", "sigma_v", "sigma_a", "known", "age"),
+)
+SIGNALS = {
+    "robot.tool": (*(f"fulcrum_{axis}" for axis in XYZ), "tip_x", "tip_y", "tip_z"),
+    "target.shaft": SHAFT,
+    "obstacle.shaft": SHAFT,
+    "obstacle.tip_velocity": XYZ,
+    "target.estimate": ESTIMATE,
+    "obstacle.estimate": ESTIMATE,
+    "camera.view_cone": (*(f"apex_{a}" for a in XYZ), "u_x", "u_y", "u_z", "half"),
+    "planner.guide": (
+        *(f"M_R_{axis}" for axis in XYZ),
+        *(f"M_O_{axis}" for axis in XYZ),
+        *("rho", "s", "l_over_L"),
+        *(f"M_Rf_{axis}" for axis in XYZ),
+    ),
+    "planner.v1": XYZ,
+    "planner.v2": XYZ,
+    "planner.v3": XYZ,
+    "planner.weights": ("c1", "c2", "c3"),
+    "planner.v_R": XYZ,
+    "navigation.stop": ("code",),
+    "joints.posture": tuple(f"q{i}" for i in range(1, 8)),
+    "joints.status": ("code",),
+    "clearance": ("obstacle", "target", "camera"),
+    "wall.force": XYZ,
+    "wall.fulcrum_error": ("distance",),
+}
+METRES_PER_NEWTON = 0.02
+"""Scale of the replay's force arrow."""
+
+
+def decorate(meshcat: Any, animation: Any, run: Any) -> None:
+    """Trails of both tips, and the wall's force as an arrow at the fulcrum."""
+    time = run.signals["time"]
+    for name, signal, rgba in (
+        ("robot", run.matrix("robot.tool")[:, 3:], (0.12, 0.37, 0.85, 1.0)),
+        ("obstacle", run.matrix("obstacle.shaft")[:, :3], (0.85, 0.2, 0.15, 1.0)),
+    ):
+        draw_trail(meshcat, animation, f"trails/{name}", time, signal, rgba)
+    force = run.matrix("wall.force") * METRES_PER_NEWTON
+    origins = np.broadcast_to(run.scenario.robot.p_WG, force.shape)
+    draw_arrow(
+        meshcat, animation, "wall_force", time, origins, force, (0.95, 0.6, 0.1, 1.0)
+    )
+
+
+STUDY = Study(
+    name="gauze",
+    scenario=GauzeScenario,
+    make_diagram=make_gauze_diagram,
+    check=check,
+    measure=measure,
+    signals=SIGNALS,
+    log_period=1.0 / 30.0,
+    plots=plots,
+    decorate=decorate,
+    controller="tool_navigation",
+    required=(
+        "system",
+        "duration",
+        "robot.p_WG",
+        "robot.p_WP",
+        "target.p_WG",
+        "obstacle.p_WG",
+    ),
+    view=View(camera=(0.55, -0.62, 0.16), target=(0.0, 0.0, -0.02)),
+)

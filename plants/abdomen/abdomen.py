@@ -1,0 +1,245 @@
+"""Abdominal wall, trocar sleeve and the spring between them.
+
+The sleeve slides on the shaft, and a spring and damper pull its middle to the
+fulcrum, a point of the wall. The spring is isotropic, but since the sleeve slides
+freely only the part across the shaft is left at rest:
+
+    f = -K (p_c - I)_perp - D d/dt (p_c - I)_perp
+
+is what the wall does to the shaft, p_c being the shaft's point nearest the fulcrum
+I. Along the shaft there is only the seal's friction, 0.25 to 3 N in the literature,
+most of it dry. Lateral trocar stiffness was not found in vivo: sweep 100 to 3000 N/m.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from pydrake.geometry import Cylinder
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    LinearBushingRollPitchYaw,
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+    SpatialInertia,
+)
+
+from plants.abdomen.skin import draw_skin
+from plants.common.looks import TROCAR, draw
+
+_SEAL_VISCOSITY = 1e4
+"""Slope of the seal's friction about zero speed, in N s/m: full friction is reached
+at 0.1 mm/s per newton."""
+
+
+@dataclass
+class AbdomenParams:
+    """Wall, sleeve and trocar spring.
+
+    Attributes:
+        stiffness: K, lateral stiffness of the trocar, in N/m.
+        damping: D, in N s/m.
+        seal_friction: Dry friction along the shaft, in N; 0 for none.
+        seal_viscosity: Friction along the shaft that grows with speed, in N s/m.
+        sleeve_mass: In kg. Light, for the sensor feels its inertia; below 20 g the
+            sleeve on a stiff trocar makes CENIC halve its steps.
+        wall_mass: In kg.
+        wall_stiffness: Of the servos that place the wall, in N/m.
+    """
+
+    stiffness: float = 500.0
+    damping: float = 5.0
+    seal_friction: float = 0.5
+    seal_viscosity: float = 2.0
+    sleeve_mass: float = 0.02
+    wall_mass: float = 0.5
+    wall_stiffness: float = 2e5
+
+    def check(self) -> None:
+        """Raises ValueError for a value that cannot be."""
+        bounds = {
+            "stiffness": (1.0, 1e5),
+            "damping": (0.0, 1e3),
+            "seal_friction": (0.0, 20.0),
+            "seal_viscosity": (0.0, 100.0),
+            "sleeve_mass": (0.005, 0.2),
+            "wall_mass": (0.05, 10.0),
+            "wall_stiffness": (1e3, 1e6),
+        }
+        for name, (low, high) in bounds.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                nearest = low if not value > low else high
+                raise ValueError(
+                    f"abdomen.{name}={value} must be in [{low}, {high}]; "
+                    f"nearest {nearest}"
+                )
+
+
+@dataclass
+class Abdomen:
+    """What `add_abdomen` added.
+
+    Attributes:
+        wall_instance: Model instance of the wall; its desired state is
+            (x, y, z, and their rates) of the wall's displacement, in m and m/s. A
+            servo that moves it sends positions alone (see `arm.SetPoint`).
+        sleeve_instance: Model instance of the sleeve, whose one actuator is the
+            seal's friction; hold it still.
+        wall: The wall's body; its frame stands at the fulcrum at rest, axes as
+            the parent frame's.
+        sleeve: The sleeve's body, z along the shaft towards the tip.
+        sleeve_joint: Its position is the distance from the sensor along the shaft.
+        bushing: The spring, from the wall to the sleeve.
+        params: What it was made from.
+    """
+
+    wall_instance: ModelInstanceIndex
+    sleeve_instance: ModelInstanceIndex
+    wall: Any
+    sleeve: Any
+    sleeve_joint: PrismaticJoint
+    bushing: LinearBushingRollPitchYaw
+    params: AbdomenParams
+
+
+def add_abdomen(
+    plant: Any,
+    shaft: Any,
+    p_PG: Sequence[float] = (0.0, 0.0, 0.0),
+    params: AbdomenParams | None = None,
+    parent: Any = None,
+) -> Abdomen:
+    """Adds the wall, and a trocar that holds a shaft.
+
+    Gravity is switched off for wall and sleeve: they are taken at their rest.
+
+    Args:
+        plant: A MultibodyPlant that is not yet finalized.
+        shaft: The frame that the sleeve slides along, z towards the tip: an
+            instrument's body frame.
+        p_PG: The fulcrum G in the parent frame P (z out of the body), in m (3).
+        params: Stiffness, friction, masses.
+        parent: A frame of the plant; the world if None.
+
+    Raises:
+        ValueError: If a parameter cannot be or the fulcrum is not finite.
+    """
+    params = params or AbdomenParams()
+    params.check()
+    if len(p_PG) != 3 or not all(math.isfinite(x) for x in p_PG):
+        raise ValueError(f"abdomen: p_PG={list(p_PG)} must be three finite numbers")
+    wall_instance = plant.AddModelInstance("wall")
+    wall = _add_wall(plant, wall_instance, parent or plant.world_frame(), p_PG, params)
+    draw_skin(plant, wall, p_PG)
+
+    sleeve_instance = plant.AddModelInstance("sleeve")
+    sleeve = plant.AddRigidBody(
+        "sleeve",
+        sleeve_instance,
+        SpatialInertia.SolidSphereWithMass(params.sleeve_mass, 0.01),
+    )
+    joint = plant.AddJoint(
+        PrismaticJoint(
+            "sleeve",
+            shaft,
+            sleeve.body_frame(),
+            [0.0, 0.0, 1.0],
+            damping=params.seal_viscosity,
+        )
+    )
+    if params.seal_friction > 0.0:
+        # A servo of zero speed whose torque saturates is dry friction.
+        seal = plant.AddJointActuator("seal", joint, params.seal_friction)
+        seal.set_controller_gains(PdControllerGains(p=0.0, d=_SEAL_VISCOSITY))
+    draw_trocar(plant, sleeve)
+
+    # Turned about x, so that the frames agree for a shaft straight down: the
+    # bushing's angles stay far from their singularity at 90 degrees of pitch.
+    fulcrum = plant.AddFrame(
+        FixedOffsetFrame(
+            "fulcrum",
+            wall.body_frame(),
+            RigidTransform(RotationMatrix.MakeXRotation(math.pi), [0.0, 0.0, 0.0]),
+            wall_instance,
+        )
+    )
+    bushing = plant.AddForceElement(
+        LinearBushingRollPitchYaw(
+            fulcrum,
+            sleeve.body_frame(),
+            [0.0] * 3,
+            [0.0] * 3,
+            [params.stiffness] * 3,
+            [params.damping] * 3,
+        )
+    )
+    for instance in (wall_instance, sleeve_instance):
+        plant.set_gravity_enabled(instance, False)
+    return Abdomen(wall_instance, sleeve_instance, wall, sleeve, joint, bushing, params)
+
+
+def seat_sleeve(plant: Any, context: Any, abdomen: Abdomen) -> None:
+    """Puts the sleeve on the shaft's point nearest the fulcrum.
+
+    Args:
+        plant: The finalized plant.
+        context: Its context, with the arm already in its posture.
+        abdomen: What `add_abdomen` returned.
+    """
+    X_WI = abdomen.wall.EvalPoseInWorld(context)
+    X_WM = abdomen.sleeve_joint.frame_on_parent().CalcPoseInWorld(context)
+    distance = (X_WM.inverse() @ X_WI.translation())[2]
+    abdomen.sleeve_joint.set_translation(context, distance)
+
+
+def draw_trocar(plant: Any, body: Any) -> None:
+    """Draws a cannula and its head around a body's z axis, which points inwards."""
+    for name, radius, length, z, rgba in (
+        ("cannula", 0.0042, 0.056, 0.012, TROCAR),
+        ("collar", 0.0085, 0.006, -0.010, TROCAR),
+        ("head", 0.0115, 0.022, -0.024, TROCAR),
+    ):
+        draw(
+            plant,
+            body,
+            Cylinder(radius, length),
+            RigidTransform([0.0, 0.0, z]),
+            name,
+            rgba,
+        )
+
+
+def _add_wall(
+    plant: Any,
+    instance: ModelInstanceIndex,
+    parent: Any,
+    p_PG: Sequence[float],
+    params: AbdomenParams,
+) -> Any:
+    """Three stiff prismatic servos in a row; the last body is the wall."""
+    frame = plant.AddFrame(
+        FixedOffsetFrame("wall_rest", parent, RigidTransform(p_PG), instance)
+    )
+    damping = 2.0 * math.sqrt(params.wall_stiffness * params.wall_mass)
+    body = None
+    for name, axis in zip("xyz", ([1, 0, 0], [0, 1, 0], [0, 0, 1]), strict=True):
+        last = name == "z"
+        mass = params.wall_mass if last else 0.02
+        body = plant.AddRigidBody(
+            "wall" if last else f"wall_{name}",
+            instance,
+            SpatialInertia.SolidSphereWithMass(mass, 0.05),
+        )
+        joint = plant.AddJoint(
+            PrismaticJoint(f"wall_{name}", frame, body.body_frame(), axis)
+        )
+        servo = plant.AddJointActuator(f"wall_{name}", joint)
+        servo.set_controller_gains(
+            PdControllerGains(p=params.wall_stiffness, d=damping)
+        )
+        frame = body.body_frame()
+    return body

@@ -1,0 +1,145 @@
+"""The PA-10-7C arm: published figures, servo gains and its set-points.
+
+Lengths, limits, speeds, torques, masses, motor inertias and friction stand in
+`pa10.urdf` beside this file, which also says how the published inertias are read.
+The joint servos are Drake's PD actuators, so that they are part of the continuous
+dynamics.
+"""
+
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
+
+from plants.arm.parameters import BASE_POSITION, FRICTION, JOINTS
+from plants.common.models import add_model
+
+
+@dataclass
+class ArmParams:
+    """Servo gains of the arm.
+
+    Attributes:
+        kp: Stiffness of each joint in Nm/rad.
+        kd: Damping of each joint in Nm s/rad, on top of the joint's friction.
+    """
+
+    kp: list[float] = field(default_factory=lambda: [4e4, 4e4, 2e4, 2e4, 3e3, 3e3, 1e3])
+    kd: list[float] = field(
+        default_factory=lambda: [800.0, 800.0, 330.0, 330.0, 14.0, 14.0, 4.0]
+    )
+
+    def check(self) -> None:
+        """Raises ValueError unless all 14 gains are positive and finite."""
+        for name in ("kp", "kd"):
+            gains = getattr(self, name)
+            if len(gains) != JOINTS:
+                raise ValueError(
+                    f"arm.{name} has {len(gains)} gains, expected {JOINTS}"
+                )
+            for i, gain in enumerate(gains):
+                if not (math.isfinite(gain) and gain > 0.0):
+                    raise ValueError(
+                        f"arm.{name}[{i}]={gain} must be > 0; "
+                        f"the default is {getattr(ArmParams(), name)[i]}"
+                    )
+
+
+def add_arm(
+    plant: Any,
+    X_PB: RigidTransform | None = None,
+    parent: Any = None,
+    params: ArmParams | None = None,
+) -> ModelInstanceIndex:
+    """Adds the arm to a plant, its base welded to a frame.
+
+    The plant's frame `flange` (of the returned instance) is the tool mount, its z
+    axis pointing out of the arm. Gravity is switched off for the arm: its own
+    controller carries its weight, and not the weight of what hangs on it.
+
+    Args:
+        plant: A MultibodyPlant that is not yet finalized.
+        X_PB: Pose of the base B (z up its first axis) in the parent frame P; the
+            default stands at `BASE_POSITION`.
+        parent: A frame of the plant; the world if None.
+        params: Servo gains.
+
+    Returns:
+        The arm's model instance.
+
+    Raises:
+        ValueError: If a gain is not positive.
+    """
+    params = params or ArmParams()
+    params.check()
+    instance = add_model(plant, Path(__file__).parent, "pa10.urdf")
+    plant.WeldFrames(
+        parent or plant.world_frame(),
+        plant.GetFrameByName("base", instance),
+        X_PB or RigidTransform(BASE_POSITION),
+    )
+    plant.set_gravity_enabled(instance, False)
+    for i, (kp, kd) in enumerate(zip(params.kp, params.kd, strict=True), start=1):
+        actuator = plant.GetJointActuatorByName(f"joint{i}", instance)
+        actuator.set_controller_gains(PdControllerGains(p=kp, d=kd))
+    return instance
+
+
+class SetPoint:
+    """Turns a desired motion into the desired state that Drake's servos take.
+
+    A PD servo with viscous friction b follows q_d, v_d without lag if it is given
+    the torque (kd + b) v_d on top of its position term. Drake 1.58's CENIC applies
+    the desired velocity with the wrong sign, so the whole term goes through the
+    position and the desired velocity stays zero, which is exact for every
+    integrator:
+
+        q_sent = q_d + (kd + b) / kp v_d + tau / kp,   v_sent = 0.
+
+    A set-point that is held for a period is meant for the hold's end: CENIC, at an
+    accuracy of 1e-2, steps from one control instant to the next, and its implicit
+    step arrives where the set-point says. (An integrator with many steps to a hold
+    arrives in its middle, and then runs up to half a period ahead.)
+    """
+
+    def __init__(self, params: ArmParams | None = None, period: float = 0.0) -> None:
+        """Prepares the constants.
+
+        Args:
+            params: Servo gains.
+            period: How long each set-point is held, in s; 0 if it is continuous.
+
+        Raises:
+            ValueError: If a gain is not positive or the period is negative.
+        """
+        params = params or ArmParams()
+        params.check()
+        if not period >= 0.0:
+            raise ValueError(f"SetPoint: period={period} s must be >= 0")
+        kp = np.array(params.kp)
+        self._lead = (np.array(params.kd) + FRICTION) / kp + period
+        self._compliance = 1.0 / kp
+
+    def __call__(
+        self,
+        q_d: Any,
+        v_d: Any,
+        tau: Any = None,
+    ) -> np.ndarray:
+        """Returns the desired state for the arm's port (14).
+
+        Args:
+            q_d: Desired joint positions at this instant, in rad (7).
+            v_d: Desired joint velocities in rad/s (7).
+            tau: Torque to feed forward in Nm (7), for example what carries the
+                instrument's weight; None for none.
+        """
+        sent = np.zeros(2 * JOINTS)
+        sent[:JOINTS] = q_d + self._lead * v_d
+        if tau is not None:
+            sent[:JOINTS] += self._compliance * tau
+        return sent

@@ -1,0 +1,36 @@
+"""The arm and its instrument alone, as a controller knows them."""
+
+from typing import Any
+
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+
+from plants.arm.arm import add_arm
+from plants.instruments.instrument import InstrumentParams, add_instrument
+
+INSTRUMENT_TIP = "instrument_tip"
+"""Name of the frame at the instrument's tip, z along the shaft and out of it."""
+
+
+def make_controller_plant(
+    X_WB: RigidTransform | None = None, instrument: InstrumentParams | None = None
+) -> Any:
+    """Makes a plant of seven positions for kinematics and gravity, without geometry.
+
+    Gravity acts on the instrument alone, so that
+    `-CalcGravityGeneralizedForces(context)` is the torque that carries it.
+
+    Args:
+        X_WB: Pose of the arm's base; its usual place if None.
+        instrument: Dimensions and masses.
+
+    Returns:
+        A finalized MultibodyPlant.
+    """
+    # Discrete, for no one integrates it: a continuous plant would warn that some
+    # integrators pass over joint limits.
+    plant = MultibodyPlant(time_step=1e-3)
+    arm = add_arm(plant, X_WB)
+    add_instrument(plant, plant.GetFrameByName("flange", arm), instrument)
+    plant.Finalize()
+    return plant

@@ -1,0 +1,135 @@
+"""The "Backward Movement" behaviour: Bauzano et al., section 4.3, equation (5).
+
+When the surgeon pushes the obstacle tool O at the robot's tool, the robot gives
+way in the direction of O's velocity, as if a damper joined the two. v_O is
+taken where the tools would touch, at O's material point M_O.
+
+`corrected` (default): F_3 = B (v_O - v_3). v_3 reaches v_O with the time
+constant 1/B and dies out when O stops, as the text says.
+`printed`: F_3 = B v_O, integrated; v_3 grows as long as O moves and stays when
+O stops.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp
+from typing import Any
+
+import numpy as np
+
+from systems.auto_guidance.signals import (
+    GUIDE_EXAMPLE,
+    OBSTACLE_EXAMPLE,
+    fulcrum,
+    usable,
+    velocity,
+)
+from systems.common.block import Block
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    shaft_point_velocity,
+    sub,
+    unit,
+)
+
+FORMS = ("corrected", "printed")
+
+
+@dataclass
+class BackwardMovementParams:
+    """Parameters of `BackwardMovement`.
+
+    Attributes:
+        form: "corrected" or "printed".
+        period: Of the update, s.
+        gain: B, 1/s: how fast the robot takes up the obstacle's velocity.
+    """
+
+    form: str = "corrected"
+    period: float = 1.0 / 60.0
+    gain: float = 20.0
+
+    def check(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: With the name, the value and what was expected.
+        """
+        if self.form not in FORMS:
+            raise ValueError(f"form={self.form!r} must be one of {', '.join(FORMS)}")
+        for name in ("period", "gain"):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                raise ValueError(f"{name}={value} must be finite and > 0")
+
+
+def contact_velocity(guide: Sequence[float], obstacle: Sequence[float]) -> Vector:
+    """v_O, the velocity of O's material point M_O, m/s; zero if O is not known."""
+    if not (usable(obstacle) and all_finite(guide)):
+        return 0.0, 0.0, 0.0
+    o = unit(sub(obstacle[0:3], fulcrum(obstacle)))
+    return shaft_point_velocity(guide[8], o, velocity(obstacle))
+
+
+def backward_movement(
+    params: BackwardMovementParams, v3: Sequence[float], dt: float, v_o: Sequence[float]
+) -> Vector:
+    """v_3 after a step of `dt` seconds with the obstacle's velocity v_O, m/s."""
+    if params.form == "printed":
+        return along(v3, params.gain * dt, v_o)
+    # The exact solution for a v_O that is constant over the step.
+    return along(v3, 1.0 - exp(-params.gain * dt), sub(v_o, v3))
+
+
+class BackwardMovement(Block):
+    """Makes the robot's tool give way to the obstacle tool that pushes it.
+
+    Bauzano et al., section 4.3, equation (5); see the module.
+
+    Port ``guide`` accepts the guide signal (12).
+    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
+    Port ``v3`` emits v_3 (3), the retreat of the guide point, m/s, in W.
+
+    The discrete state is v_3 (3) and the time of the last update. The output
+    is that of the step from then to now: no sample of delay.
+    """
+
+    def __init__(self, params: BackwardMovementParams | None = None) -> None:
+        """Builds the block.
+
+        Args:
+            params: Parameters; the defaults if None.
+
+        Raises:
+            ValueError: If a parameter is out of range.
+        """
+        super().__init__()
+        self._params = params or BackwardMovementParams()
+        self._params.check()
+        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
+        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
+        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
+        self._v3 = self.vector_out(
+            "v3",
+            3,
+            self._calc_v3,
+            {
+                self._guide.ticket(),
+                self._obstacle.ticket(),
+                self.xd_ticket(),
+                self.time_ticket(),
+            },
+        )
+        self.update_every(self._params.period, self._update)
+
+    def _calc_v3(self, context: Any) -> Vector:
+        *v3, t_last = context.get_discrete_state_vector().value().tolist()
+        v_o = contact_velocity(
+            self._guide.Eval(context).tolist(), self._obstacle.Eval(context).tolist()
+        )
+        return backward_movement(self._params, v3, context.get_time() - t_last, v_o)
+
+    def _update(self, context: Any) -> list[float]:
+        return [*self._v3.Eval(context).tolist(), context.get_time()]

@@ -1,0 +1,374 @@
+"""The fuzzy decision: Bauzano et al., section 4, Table I and equation (6).
+
+v_R = c_1 v_1 + c_2 v_2 + c_3 v_3. The directions of the robot's and the
+obstacle's velocity, as quadrants, give a label of Table I: A (go away), FA (far
+away), C (get closer), HC (high close). Label and distance give the weights.
+
+Axes of the quadrants (the paper names none; this reading fits all 16 cells): y
+points from M_R to M_O, x across y to the goal's side, quadrants 1 to 4
+counter-clockwise. Then A: both in the same quadrant, FA: they differ in x only,
+C: in y only, HC: in both. The memberships are cos^2 humps at 45, 135, 225 and
+315 degrees. The robot's velocity is v_1, where the robot wants to go: with v_R
+itself, a robot that gives way would look like one that goes along with the
+obstacle, and turn back. A robot at rest has no direction: it belongs to all
+quadrants. v_O is that of O's material point M_O.
+
+The printed table cannot tell an opposed pair that closes from one that parts
+(turn both velocities round). `literal` takes it as it is; `gated` lets it count
+only as far as the tools close.
+
+Weights: far off, and with A and FA, the field alone, (1, 0, 0). Nearer, C and HC
+add the corrections, (1, 1, 0), and next to the obstacle the backward movement,
+(1, 1, 1): then the field acts relative to the obstacle and the robot follows it.
+An obstacle at rest has no direction, and is left to the field.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import hypot
+from typing import Any
+
+import numpy as np
+
+from systems.auto_guidance.backward_movement import contact_velocity
+from systems.auto_guidance.signals import (
+    GUIDE_EXAMPLE,
+    OBSTACLE_EXAMPLE,
+    ROBOT_TOOL_EXAMPLE,
+    TARGET_EXAMPLE,
+    usable,
+)
+from systems.common.block import Block
+from systems.common.fuzzy import Partition, RuleTable
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    any_perpendicular,
+    dot,
+    limited,
+    norm,
+    sub,
+    unit,
+)
+
+TABLE_I = [
+    ["A", "FA", "HC", "C"],
+    ["FA", "A", "C", "HC"],
+    ["HC", "C", "A", "FA"],
+    ["C", "HC", "FA", "A"],
+]
+"""Rows: quadrant of v_O; columns: quadrant of v_R."""
+
+DECISIONS = ["A", "FA", "C", "HC"]
+DISTANCES = ["close", "near", "far"]
+WEIGHT_TABLE = [
+    ["go", "go", "go"],
+    ["go", "go", "go"],
+    ["follow", "correct", "go"],
+    ["follow", "correct", "go"],
+]
+"""Rows: DECISIONS; columns: DISTANCES."""
+
+WEIGHTS = {
+    "go": [1.0, 0.0, 0.0],
+    "correct": [1.0, 1.0, 0.0],
+    "follow": [1.0, 1.0, 1.0],
+}
+"""(c_1, c_2, c_3) of each conclusion."""
+
+TABLES = ("literal", "gated")
+
+
+@dataclass
+class FuzzyArbiterParams:
+    """Parameters of `FuzzyArbiter`.
+
+    Attributes:
+        table: "literal" or "gated".
+        period: Of the update, s.
+        distances: Centers of close, near and far, m, in rho less the contact
+            distance.
+        contact_distance: rho at contact, m: the sum of both tools' radii.
+        moving_speed: Speed from which on a direction counts in full, m/s; in
+            proportion below. Of M_O for the obstacle, of the tip for the robot.
+        closing_speed: Closing speed at which the gated table counts in full, m/s.
+        max_speed: v_max of the tip, m/s.
+        max_acceleration: Of the tip's commanded velocity, m/s^2.
+    """
+
+    table: str = "gated"
+    period: float = 1.0 / 60.0
+    distances: list[float] = field(default_factory=lambda: [0.01, 0.025, 0.05])
+    contact_distance: float = 0.005
+    moving_speed: float = 0.01
+    closing_speed: float = 0.01
+    max_speed: float = 0.1
+    max_acceleration: float = 1.0
+
+    def check(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: With the name, the value and what was expected.
+        """
+        if self.table not in TABLES:
+            raise ValueError(f"table={self.table!r} must be one of {', '.join(TABLES)}")
+        if len(self.distances) != 3 or not (
+            0.0 <= self.distances[0] < self.distances[1] < self.distances[2]
+        ):
+            raise ValueError(
+                f"distances={self.distances} must be 3 increasing values >= 0, for "
+                f"{', '.join(DISTANCES)}"
+            )
+        for name in (
+            "period",
+            "moving_speed",
+            "closing_speed",
+            "max_speed",
+            "max_acceleration",
+        ):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                raise ValueError(f"{name}={value} must be finite and > 0")
+        if not 0.0 <= self.contact_distance < float("inf"):
+            raise ValueError(
+                f"contact_distance={self.contact_distance} must be finite and >= 0"
+            )
+
+
+def quadrants(x: float, y: float, moving_speed: float) -> list[float]:
+    """Membership of a velocity in the quadrants 1 to 4.
+
+    cos^2 of the angle to a quadrant's diagonal, within 90 degrees. Below
+    `moving_speed` the direction counts less and less: every quadrant gains.
+    """
+    speed = hypot(x, y)
+    if speed < 1e-9:
+        return [1.0, 1.0, 1.0, 1.0]
+    # Components along the diagonals of quadrants 1 and 2.
+    c1 = (x + y) / speed
+    c2 = (y - x) / speed
+    unsure = max(0.0, 1.0 - speed / moving_speed)
+    return [
+        max(0.5 * c1 * c1 if c1 > 0.0 else 0.0, unsure),
+        max(0.5 * c2 * c2 if c2 > 0.0 else 0.0, unsure),
+        max(0.5 * c1 * c1 if c1 < 0.0 else 0.0, unsure),
+        max(0.5 * c2 * c2 if c2 < 0.0 else 0.0, unsure),
+    ]
+
+
+def axes(guide: Sequence[float]) -> tuple[Vector, Vector]:
+    """The quadrants' axes x, y (unit vectors); see the module.
+
+    Where the tools' axes touch or the goal lies along y, a fixed perpendicular
+    stands in for the direction that is missing.
+
+    Args:
+        guide: The guide signal (12).
+    """
+    rx, ry, rz, ox, oy, oz, *_, fx, fy, fz = guide
+    goal = (fx - rx, fy - ry, fz - rz)
+    y = unit((ox - rx, oy - ry, oz - rz), any_perpendicular(goal))
+    across = along(goal, -dot(goal, y), y)
+    size = norm(across)
+    if size < 1e-6:
+        return any_perpendicular(y), y
+    return (across[0] / size, across[1] / size, across[2] / size), y
+
+
+class Decision:
+    """Table I and the weights' table with their memberships."""
+
+    def __init__(self, params: FuzzyArbiterParams) -> None:
+        self._params = params
+        # Table I concludes with a label, not with a number.
+        self._table = RuleTable(TABLE_I, {label: [] for label in DECISIONS})
+        self._weights = RuleTable(WEIGHT_TABLE, WEIGHTS)
+        self._distances = Partition(DISTANCES, params.distances)
+
+    def labels(self, v_r: tuple[float, float], v_o: tuple[float, float]) -> list[float]:
+        """Degrees of DECISIONS for two velocities on the axes x, y, m/s."""
+        slow = self._params.moving_speed
+        return self._table.activations(quadrants(*v_o, slow), quadrants(*v_r, slow))
+
+    def weights(self, labels: Sequence[float], distance: float) -> list[float]:
+        """(c_1, c_2, c_3) for degrees of DECISIONS at a distance in m."""
+        return self._weights.infer(labels, self._distances.degrees(distance))
+
+    def __call__(
+        self, v1: Sequence[float], guide: Sequence[float], obstacle: Sequence[float]
+    ) -> list[float]:
+        """(c_1, c_2, c_3) for finite inputs and a known obstacle."""
+        params = self._params
+        v_o = contact_velocity(guide, obstacle)
+        x, y = axes(guide)
+        r_y, o_y = dot(v1, y), dot(v_o, y)
+        alert = min(1.0, norm(v_o) / params.moving_speed)
+        if params.table == "gated":
+            alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
+        if alert <= 0.0:
+            return [1.0, 0.0, 0.0]
+        s = guide[7]
+        labels = self.labels((dot(v1, x) / s, r_y / s), (dot(v_o, x), o_y))
+        c1, c2, c3 = self.weights(labels, guide[6] - params.contact_distance)
+        return [1.0 + alert * (c1 - 1.0), alert * c2, alert * c3]
+
+
+def commanded_velocity(
+    params: FuzzyArbiterParams,
+    v_tip: Sequence[float],
+    dt: float,
+    weights: Sequence[float],
+    velocities: Sequence[Sequence[float]],
+    s: float,
+) -> Vector:
+    """v_R / s of equation (6), the tip's velocity, within its limits, m/s.
+
+    Args:
+        params: Parameters.
+        v_tip: v_R / s before the step, m/s.
+        dt: Length of the step, s.
+        weights: (c_1, c_2, c_3).
+        velocities: v_1, v_2, v_3, m/s.
+        s: Proportion of the guide point.
+    """
+    (a, b, c), (v1, v2, v3) = weights, velocities
+    wanted = (
+        (a * v1[0] + b * v2[0] + c * v3[0]) / s,
+        (a * v1[1] + b * v2[1] + c * v3[1]) / s,
+        (a * v1[2] + b * v2[2] + c * v3[2]) / s,
+    )
+    change = sub(limited(wanted, params.max_speed), v_tip)
+    return along(v_tip, 1.0, limited(change, params.max_acceleration * dt))
+
+
+class FuzzyArbiter(Block):
+    """Weighs the three behaviours and adds them up to the guide point's velocity.
+
+    Bauzano et al., section 4, Table I and equation (6); see the module. While an
+    estimate is not known or an input is not finite, the weights are zero and the
+    robot slows down to rest at the maximum acceleration.
+
+    Port ``v1`` accepts v_1 (3) of go to target, m/s, in W.
+    Port ``v2`` accepts v_2 (3) of the velocity corrections, m/s, in W.
+    Port ``v3`` accepts v_3 (3) of the backward movement, m/s, in W.
+    Port ``guide`` accepts the guide signal (12).
+    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
+    (6), m, in W.
+    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
+    Port ``target`` accepts the estimate (17) of the target tool S.
+    Port ``weights`` emits c_1, c_2, c_3 (3).
+    Port ``v_R`` emits the commanded velocity of the guide point (3), m/s, in W.
+
+    The discrete state is v_R / s (3) and the time of the last update. The output
+    is that of the step from then to now: no sample of delay.
+    """
+
+    def __init__(self, params: FuzzyArbiterParams | None = None) -> None:
+        """Builds the block.
+
+        Args:
+            params: Parameters; the defaults if None.
+
+        Raises:
+            ValueError: If a parameter is out of range.
+        """
+        super().__init__()
+        self._params = params or FuzzyArbiterParams()
+        self._params.check()
+        self._decision = Decision(self._params)
+        self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
+        self._v2 = self.vector_in("v2", [-0.01, 0.0, 0.0])
+        self._v3 = self.vector_in("v3", [0.0, -0.01, 0.0])
+        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
+        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
+        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
+        self._target = self.vector_in("target", TARGET_EXAMPLE)
+        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
+        inputs = {
+            port.ticket()
+            for port in (
+                self._v1,
+                self._v2,
+                self._v3,
+                self._guide,
+                self._robot_tool,
+                self._obstacle,
+                self._target,
+            )
+        }
+        self._step = self.cached(
+            "step", self._calc_step, inputs | {self.xd_ticket(), self.time_ticket()}
+        )
+        step_ticket = {self._step.ticket()}
+        self.vector_out("weights", 3, lambda c: self._step.Eval(c)[0], step_ticket)
+        self.vector_out("v_R", 3, self._calc_v_r, step_ticket)
+        self.update_every(self._params.period, self._update)
+
+    def _calc_step(self, context: Any) -> tuple[list[float], Vector, float]:
+        """(weights, v_R / s, s)."""
+        *v_tip, t_last = context.get_discrete_state_vector().value().tolist()
+        v1 = self._v1.Eval(context).tolist()
+        v2 = self._v2.Eval(context).tolist()
+        v3 = self._v3.Eval(context).tolist()
+        guide = self._guide.Eval(context).tolist()
+        robot_tool = self._robot_tool.Eval(context).tolist()
+        obstacle = self._obstacle.Eval(context).tolist()
+        target = self._target.Eval(context).tolist()
+        return arbitrate(
+            self._params,
+            self._decision,
+            v_tip,
+            context.get_time() - t_last,
+            (v1, v2, v3),
+            guide,
+            robot_tool,
+            obstacle,
+            target,
+        )
+
+    def _calc_v_r(self, context: Any) -> Vector:
+        _, v_tip, s = self._step.Eval(context)
+        return s * v_tip[0], s * v_tip[1], s * v_tip[2]
+
+    def _update(self, context: Any) -> list[float]:
+        return [*self._step.Eval(context)[1], context.get_time()]
+
+
+def arbitrate(
+    params: FuzzyArbiterParams,
+    decision: Decision,
+    v_tip: Sequence[float],
+    dt: float,
+    velocities: tuple[Sequence[float], Sequence[float], Sequence[float]],
+    guide: Sequence[float],
+    robot_tool: Sequence[float],
+    obstacle: Sequence[float],
+    target: Sequence[float],
+) -> tuple[list[float], Vector, float]:
+    """One step of the block: decision, sum and limits.
+
+    Args:
+        params: Parameters.
+        decision: The tables.
+        v_tip: v_R / s before the step, m/s.
+        dt: Length of the step, s.
+        velocities: v_1, v_2, v_3, m/s.
+        guide: The guide signal (12).
+        robot_tool: G_R, P_R (6), m.
+        obstacle: Estimate (17) of O.
+        target: Estimate (17) of S.
+
+    Returns:
+        (weights, v_R / s in m/s, s).
+    """
+    known = usable(obstacle) and usable(target)
+    if not (known and all_finite(*velocities, guide, robot_tool)):
+        s = guide[7] if all_finite(guide) else 1.0
+        weights = [0.0, 0.0, 0.0]
+        change = limited(sub((0.0, 0.0, 0.0), v_tip), params.max_acceleration * dt)
+        return weights, along(v_tip, 1.0, change), s
+    weights = decision(velocities[0], guide, obstacle)
+    s = guide[7]
+    return weights, commanded_velocity(params, v_tip, dt, weights, velocities, s), s

@@ -1,0 +1,373 @@
+"""The "Go-to Target" behaviour: Bauzano et al., section 4.1, equations (1) to (4).
+
+The robot's tool R is a line through its fulcrum G_R, and so is the surgeon's
+obstacle tool O. The closest points of the two are the guide point M_R and M_O,
+rho apart. M_R sits at the proportion s of R's inserted length; when the tip
+has arrived, it will be at M_R^f = G_R + s (P_S - G_R). A potential field pulls
+M_R to M_R^f and pushes it away from M_O.
+
+Everything is tied to the proportion s: the tip moves with v_1 / s. Equation
+(4) is integrated for the tip (force F_1 / s), which is the same for a constant
+s and leaves the tip's velocity continuous where M_R jumps along the shaft.
+
+Two forms:
+
+`corrected` (default). Equation (2) as the gradient it comes from,
+U_rep = K/2 (1/rho - 1/rho_0)^2 r with r = |r_goal|:
+F_rep = K'_r (1/rho - 1/rho_0) [ r/rho^2 n_o + 1/2 (1/rho - 1/rho_0) n ], n_o
+the unit vector from M_O to M_R. n, the paper's constant that is to lead out of
+local minima, is a unit vector perpendicular to n_o on the goal's side, turned
+to a fixed side (R retracting) where goal and obstacle are in line. Equation (4)
+gets a virtual damping D relative to the moving target, and the velocity that
+force and damping balance at is limited to s v_max:
+dv_1/dt = F_1 - D (v_1 - s v_S). r counts no less than a floor, so that a goal
+inside the field does not switch the field off, and no more than the distance at
+which attraction alone asks for v_max; attraction is cut at the same distance.
+
+`printed`. Equations (1) to (4) to the letter, v_1 limited to s v_max. It pushes
+the robot away from its goal rather than from the obstacle, and orbits.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, hypot
+from typing import Any
+
+import numpy as np
+
+from systems.auto_guidance.signals import (
+    OBSTACLE_EXAMPLE,
+    ROBOT_TOOL_EXAMPLE,
+    TARGET_EXAMPLE,
+    fulcrum,
+    usable,
+    velocity,
+)
+from systems.common.block import Block
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    any_perpendicular,
+    closest_points,
+    cross,
+    dot,
+    limited,
+    sub,
+    unit,
+)
+
+FORMS = ("corrected", "printed")
+
+# How far (sine of the angle between goal and obstacle) the fixed side counts.
+_TIE = 0.05
+
+
+@dataclass
+class GoToTargetParams:
+    """Parameters of `GoToTarget`.
+
+    Attributes:
+        form: "corrected" or "printed".
+        period: Of the update, s.
+        attraction_gain: K_a, 1/s^2 (the virtual mass is 1).
+        repulsion_gain: K_r, m^3/s^2; in the printed form the same number, m^4/s^2.
+            With the defaults attraction and repulsion balance 10 mm off the
+            obstacle's surface, at O's tip.
+        influence_distance: rho_0, m.
+        contact_distance: Subtracted from the axes' distance to give the rho of
+            the potential, m: the sum of both tools' radii for the distance of
+            the surfaces, 0 for the distance of the axes.
+        damping: D, 1/s. Not in the paper; the corrected form only.
+        max_speed: v_max of the tip, m/s.
+        max_acceleration: Of the tip's commanded velocity, m/s^2; the corrected
+            form only.
+        goal_distance_floor: Least r (of the tip) in the repulsion, m.
+        proportion_floor: Least s, for shafts that are closest at G_R.
+    """
+
+    form: str = "corrected"
+    period: float = 1.0 / 60.0
+    attraction_gain: float = 120.0
+    repulsion_gain: float = 4e-4
+    influence_distance: float = 0.025
+    contact_distance: float = 0.005
+    damping: float = 60.0
+    max_speed: float = 0.1
+    max_acceleration: float = 1.0
+    goal_distance_floor: float = 0.008
+    proportion_floor: float = 0.1
+
+    def check(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: With the name, the value and what was expected.
+        """
+        if self.form not in FORMS:
+            raise ValueError(f"form={self.form!r} must be one of {', '.join(FORMS)}")
+        for name in (
+            "period",
+            "attraction_gain",
+            "influence_distance",
+            "damping",
+            "max_speed",
+            "max_acceleration",
+        ):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                raise ValueError(f"{name}={value} must be finite and > 0")
+        for name in ("repulsion_gain", "contact_distance", "goal_distance_floor"):
+            value = getattr(self, name)
+            if not 0.0 <= value < float("inf"):
+                raise ValueError(f"{name}={value} must be finite and >= 0")
+        if not 0.0 < self.proportion_floor <= 1.0:
+            raise ValueError(
+                f"proportion_floor={self.proportion_floor} must be in (0, 1]"
+            )
+
+    @property
+    def slowing_distance(self) -> float:
+        """Distance of the tip at which attraction alone balances at v_max, m."""
+        return self.max_speed * self.damping / (2.0 * self.attraction_gain)
+
+
+def guide_point(
+    robot_tool: Sequence[float],
+    obstacle: Sequence[float],
+    p_WPs: Sequence[float],
+    proportion_floor: float,
+) -> list[float]:
+    """Steps 1 and 2 of the procedure: the guide point and its target.
+
+    Args:
+        robot_tool: G_R, P_R (6), m.
+        obstacle: An estimate (17) of O: P_O first, G_O at 9.
+        p_WPs: P_S, m.
+        proportion_floor: Least s.
+
+    Returns:
+        The `guide` signal (12): M_R, M_O, rho, s, l/L, M_R^f. rho is the true
+        distance of the axes, also where s is floored.
+    """
+    g = robot_tool[0:3]
+    p = robot_tool[3:6]
+    s, fraction, rho, m_r, m_o = closest_points(g, p, fulcrum(obstacle), obstacle[0:3])
+    if s < proportion_floor:
+        s = proportion_floor
+        m_r = along(g, s, sub(p, g))
+    m_rf = along(g, s, sub(p_WPs, g))
+    return [*m_r, *m_o, rho, s, fraction, *m_rf]
+
+
+def potential_distance(rho: float, params: GoToTargetParams) -> float:
+    """The rho of the potential, m: floored just off contact, where it is singular."""
+    return max(rho - params.contact_distance, 5e-4)
+
+
+def away_from_obstacle(guide: Sequence[float], u: Sequence[float]) -> Vector:
+    """Unit vector n_o from M_O to M_R; across R's shaft `u` where they touch."""
+    d = (guide[0] - guide[3], guide[1] - guide[4], guide[2] - guide[5])
+    return unit(d, any_perpendicular(u))
+
+
+def corrected_force(
+    params: GoToTargetParams, guide: Sequence[float], u: Sequence[float]
+) -> Vector:
+    """F_1 / s of equation (1), corrected form: acceleration of the tip, m/s^2.
+
+    Args:
+        params: Gains and distances.
+        guide: The guide signal (12).
+        u: Unit vector along R's shaft, fulcrum to tip.
+    """
+    s = guide[7]
+    goal = (guide[9] - guide[0], guide[10] - guide[1], guide[11] - guide[2])
+    r = hypot(goal[0], goal[1], goal[2])
+    r_tip = r / s
+    r_far = params.slowing_distance
+    # F_att = 2 K_a r_goal, cut at r_far.
+    pull = 2.0 * params.attraction_gain / s
+    if r_tip > r_far:
+        pull *= r_far / r_tip
+    rho = potential_distance(guide[6], params)
+    if rho >= params.influence_distance:
+        return pull * goal[0], pull * goal[1], pull * goal[2]
+
+    n_o = away_from_obstacle(guide, u)
+    gap = 1.0 / rho - 1.0 / params.influence_distance
+    k_r = guide[8] * params.repulsion_gain  # (3): l/L K_r
+    floor = params.goal_distance_floor
+    push = k_r * gap * min(max(r_tip, floor), max(r_far, floor)) / (rho * rho)
+    # Unit vector across n_o: the goal's side, a little of the fixed side.
+    e = dot(goal, n_o)
+    out = dot(u, n_o)
+    a = 1.0 / max(r, 1e-9)
+    nx = a * (goal[0] - e * n_o[0]) - _TIE * (u[0] - out * n_o[0])
+    ny = a * (goal[1] - e * n_o[1]) - _TIE * (u[1] - out * n_o[1])
+    nz = a * (goal[2] - e * n_o[2]) - _TIE * (u[2] - out * n_o[2])
+    size = hypot(nx, ny, nz)
+    # It fades near the goal, where its direction would flip at every step.
+    fade = r_tip / floor if r_tip < floor else 1.0
+    slide = 0.5 * k_r * gap * gap * fade / (s * size) if size > 1e-9 else 0.0
+    return (
+        pull * goal[0] + push * n_o[0] + slide * nx,
+        pull * goal[1] + push * n_o[1] + slide * ny,
+        pull * goal[2] + push * n_o[2] + slide * nz,
+    )
+
+
+def printed_force(
+    params: GoToTargetParams, guide: Sequence[float], u: Sequence[float]
+) -> Vector:
+    """F_1 / s of equation (1) with (2) as printed: acceleration of the tip, m/s^2.
+
+    Args:
+        params: Gains and distances.
+        guide: The guide signal (12).
+        u: Unit vector along R's shaft, fulcrum to tip.
+    """
+    s = guide[7]
+    goal = (guide[9] - guide[0], guide[10] - guide[1], guide[11] - guide[2])
+    rho = potential_distance(guide[6], params)
+    pull = 2.0 * params.attraction_gain / s
+    force = (pull * goal[0], pull * goal[1], pull * goal[2])
+    if rho >= params.influence_distance:
+        return force
+    rho_hat = away_from_obstacle(guide, u)
+    n = cross(cross(unit(goal), rho_hat), rho_hat)
+    gap = 1.0 / rho - 1.0 / params.influence_distance
+    k = -guide[8] * params.repulsion_gain * gap * gap / s  # (3): l/L K_r
+    a = k / (rho * rho)
+    return (
+        force[0] + a * goal[0] + 0.5 * k * n[0],
+        force[1] + a * goal[1] + 0.5 * k * n[1],
+        force[2] + a * goal[2] + 0.5 * k * n[2],
+    )
+
+
+def go_to_target(
+    params: GoToTargetParams,
+    v_tip: Sequence[float],
+    dt: float,
+    robot_tool: Sequence[float],
+    obstacle: Sequence[float],
+    target: Sequence[float],
+) -> tuple[Vector, list[float]]:
+    """One step of the behaviour.
+
+    Args:
+        params: Parameters.
+        v_tip: v_1 / s before the step, m/s.
+        dt: Length of the step, s.
+        robot_tool: G_R, P_R (6), m.
+        obstacle: Estimate (17) of O.
+        target: Estimate (17) of S.
+
+    Returns:
+        (v_1 / s after the step in m/s, the guide signal). Without a usable
+        estimate of both tools the velocity runs down to zero; without a finite
+        one the guide point is the tip, and the distance to O is given as 0.
+    """
+    stop = (0.0, 0.0, 0.0)
+    if not all_finite(robot_tool):
+        guide = [0.0] * 7 + [1.0, 1.0] + [0.0] * 3
+        return approach(v_tip, stop, params, dt), guide
+    p = robot_tool[3:6]
+    if not all_finite(obstacle[0:3], fulcrum(obstacle), target[0:3]):
+        guide = [*p, *p, 0.0, 1.0, 1.0, *p]
+        return approach(v_tip, stop, params, dt), guide
+    guide = guide_point(robot_tool, obstacle, target, params.proportion_floor)
+    if not (usable(obstacle) and usable(target)):
+        return approach(v_tip, stop, params, dt), guide
+    u = unit(sub(p, robot_tool[0:3]), (0.0, 0.0, -1.0))
+    if params.form == "printed":
+        force = printed_force(params, guide, u)
+        return limited(along(v_tip, dt, force), params.max_speed), guide
+    force = corrected_force(params, guide, u)
+    balance = along(velocity(target), 1.0 / params.damping, force)
+    goal_velocity = limited(balance, params.max_speed)
+    return approach(v_tip, goal_velocity, params, dt), guide
+
+
+def approach(
+    v_tip: Sequence[float],
+    v_balance: Sequence[float],
+    params: GoToTargetParams,
+    dt: float,
+) -> Vector:
+    """Damped motion (4) towards the velocity at which force and damping balance.
+
+    The exact solution of dv/dt = D (v_balance - v) over `dt`, with the change
+    limited to the maximum acceleration. Velocities in m/s.
+    """
+    share = 1.0 - exp(-params.damping * dt)
+    change = sub(v_balance, v_tip)
+    change = (share * change[0], share * change[1], share * change[2])
+    return along(v_tip, 1.0, limited(change, params.max_acceleration * dt))
+
+
+class GoToTarget(Block):
+    """Leads the guide point to its target round the obstacle tool by a potential field.
+
+    Bauzano et al., section 4.1, equations (1) to (4); see the module.
+
+    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
+    (6), m, in W.
+    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
+    Port ``target`` accepts the estimate (17) of the target tool S.
+    Port ``v1`` emits the guide point's velocity v_1 (3), m/s, in W.
+    Port ``guide`` emits the guide signal (12): M_R, M_O, rho, s, l/L, M_R^f.
+
+    The discrete state is v_1 / s (3) and the time of the last update. The
+    outputs are those of the step from then to now: no sample of delay.
+    """
+
+    def __init__(self, params: GoToTargetParams | None = None) -> None:
+        """Builds the block.
+
+        Args:
+            params: Parameters; the defaults if None.
+
+        Raises:
+            ValueError: If a parameter is out of range.
+        """
+        super().__init__()
+        self._params = params or GoToTargetParams()
+        self._params.check()
+        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
+        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
+        self._target = self.vector_in("target", TARGET_EXAMPLE)
+        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
+        inputs = {
+            self._robot_tool.ticket(),
+            self._obstacle.ticket(),
+            self._target.ticket(),
+            self.xd_ticket(),
+            self.time_ticket(),
+        }
+        # Both outputs and the update share one step.
+        self._step = self.cached("step", self._calc_step, inputs)
+        step_ticket = {self._step.ticket()}
+        self.vector_out("v1", 3, self._calc_v1, step_ticket)
+        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[1], step_ticket)
+        self.update_every(self._params.period, self._update)
+
+    def _calc_step(self, context: Any) -> tuple[Vector, list[float]]:
+        *v_tip, t_last = context.get_discrete_state_vector().value().tolist()
+        return go_to_target(
+            self._params,
+            v_tip,
+            context.get_time() - t_last,
+            self._robot_tool.Eval(context).tolist(),
+            self._obstacle.Eval(context).tolist(),
+            self._target.Eval(context).tolist(),
+        )
+
+    def _calc_v1(self, context: Any) -> Vector:
+        v_tip, guide = self._step.Eval(context)
+        s = guide[7]
+        return s * v_tip[0], s * v_tip[1], s * v_tip[2]
+
+    def _update(self, context: Any) -> list[float]:
+        return [*self._step.Eval(context)[0], context.get_time()]

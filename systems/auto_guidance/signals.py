@@ -1,0 +1,61 @@
+"""What stands where in the signals that the auto-guidance blocks exchange.
+
+`robot_tool` (6): fulcrum p_WG, tip p_WP of the robot's instrument.
+`estimate` (17) of a surgeon's tool: tip p_WP, v_WP, a_WP, fulcrum p_WG,
+sigma_p, sigma_v, sigma_a, known (1 or 0), age of the last valid frame.
+`guide` (12): p_WMR, p_WMO, rho, s, l/L, p_WMRf.
+World frame, SI units.
+"""
+
+from collections.abc import Sequence
+
+from systems.common.geometry import all_finite
+
+ROBOT_TOOL_EXAMPLE = [0.0, 0.0, 0.0, 0.02, 0.0, -0.12]
+"""A robot's instrument, 0.12 m inside."""
+
+TARGET_EXAMPLE = [
+    *(-0.05, 0.0, -0.12),
+    *(0.005, 0.0, 0.0),
+    *(0.0, 0.0, 0.0),
+    *(-0.12, 0.0, 0.0),
+    *(0.0003, 0.003, 0.05, 1.0, 0.0),
+]
+"""An estimate of the target tool S, drifting at 5 mm/s."""
+
+OBSTACLE_EXAMPLE = [
+    *(-0.02, 0.01, -0.1),
+    *(0.0, -0.03, 0.0),
+    *(0.0, 0.0, 0.0),
+    *(0.0, 0.1, 0.0),
+    *(0.0003, 0.003, 0.05, 1.0, 0.0),
+]
+"""An estimate of the obstacle tool O, crossing at 30 mm/s."""
+
+GUIDE_EXAMPLE = [
+    *(0.012, 0.0, -0.072),
+    *(-0.01, 0.02, -0.08),
+    *(0.03, 0.6, 0.7),
+    *(-0.03, 0.0, -0.072),
+]
+"""A guide point 0.03 m from the obstacle tool."""
+
+
+def velocity(estimate: Sequence[float]) -> Sequence[float]:
+    """v_WP of an estimate, m/s."""
+    return estimate[3:6]
+
+
+def acceleration(estimate: Sequence[float]) -> Sequence[float]:
+    """a_WP of an estimate, m/s^2."""
+    return estimate[6:9]
+
+
+def fulcrum(estimate: Sequence[float]) -> Sequence[float]:
+    """p_WG of an estimate, m."""
+    return estimate[9:12]
+
+
+def usable(estimate: Sequence[float]) -> bool:
+    """True if the estimator knows the tool and gives numbers for its motion."""
+    return estimate[15] > 0.5 and all_finite(estimate[0:12])

@@ -1,0 +1,266 @@
+"""The "Velocity Corrections" behaviour: Bauzano et al., section 4.2, Table II.
+
+The potential field sees the obstacle tool O where it is now. This behaviour
+looks ahead: where O's predicted motion crosses the guide point's way, it slows
+the robot so that the surgeon passes first: v_2 = -(1 - scale) v_1.
+
+Crossing: within the horizon O's shaft sweeps the triangle of its fulcrum, its
+tip now and its predicted tip. The guide point's way is the ray from M_R along
+v_1. Where the ray pierces the triangle, Table II gets the distance from M_R
+and the time at which O's shaft is there. A near miss (the ray passes a little
+beyond O's tip, O has only just passed, the crossing lies a little behind M_R
+or beyond the goal) counts in part, so that v_2 has no steps.
+
+An obstacle that stands has no crossing time: v_2 = 0, it is the potential
+field's task (the paper's static case).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import exp
+from typing import Any
+
+from systems.auto_guidance.signals import (
+    GUIDE_EXAMPLE,
+    OBSTACLE_EXAMPLE,
+    acceleration,
+    fulcrum,
+    usable,
+    velocity,
+)
+from systems.common.block import Block
+from systems.common.fuzzy import Partition, RuleTable
+from systems.common.geometry import Vector, all_finite, along, cross, dot, norm, sub
+
+DISTANCES = ["Z", "AZ", "M", "F", "VF"]
+TIMES = ["Z", "AZ", "M", "L", "VL"]
+SPEEDS = ["S", "AS", "SM", "NM", "FM", "MM"]
+
+TABLE_II = [
+    ["S", "SM", "NM", "MM", "MM"],
+    ["S", "SM", "NM", "MM", "MM"],
+    ["SM", "SM", "NM", "FM", "MM"],
+    ["AS", "AS", "SM", "NM", "MM"],
+    ["AS", "AS", "AS", "SM", "FM"],
+]
+"""Rows: time until O crosses (TIMES); columns: distance to there (DISTANCES)."""
+
+
+@dataclass
+class VelocityCorrectionsParams:
+    """Parameters of `VelocityCorrections`. The paper gives the labels only.
+
+    Attributes:
+        distances: Centers of the DISTANCES Z, AZ, M, F, VF, m.
+        times: Centers of the TIMES Z, AZ, M, L, VL, s.
+        scales: Share of v_1 that is kept for the SPEEDS S, AS, SM, NM, FM, MM.
+        horizon: How far ahead O is predicted, s; a crossing in the last quarter
+            counts in part.
+        acceleration_time: Time constant with which O's acceleration is taken to
+            die out, s.
+        moving_speed: Speed of O's tip from which on corrections count in full,
+            m/s; in proportion below.
+        miss_distance: How near a miss must be to count, m.
+    """
+
+    distances: list[float] = field(
+        default_factory=lambda: [0.0, 0.01, 0.025, 0.05, 0.08]
+    )
+    times: list[float] = field(default_factory=lambda: [0.0, 0.25, 0.5, 1.0, 2.0])
+    scales: list[float] = field(
+        default_factory=lambda: [0.0, 0.1, 0.25, 0.5, 0.75, 1.0]
+    )
+    horizon: float = 2.0
+    acceleration_time: float = 0.2
+    moving_speed: float = 0.01
+    miss_distance: float = 0.01
+
+    def check(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: With the name, the value and what was expected.
+        """
+        for name, labels in (
+            ("distances", DISTANCES),
+            ("times", TIMES),
+            ("scales", SPEEDS),
+        ):
+            values = getattr(self, name)
+            if len(values) != len(labels) or not values[0] >= 0.0:
+                raise ValueError(
+                    f"{name}={values} must be {len(labels)} values >= 0, for "
+                    f"{', '.join(labels)}"
+                )
+            if not all(a < b for a, b in pairwise(values)):
+                raise ValueError(f"{name}={values} must increase")
+        if self.scales[0] != 0.0 or self.scales[-1] != 1.0:
+            raise ValueError(f"scales={self.scales} must start at 0 and end at 1")
+        for name in ("horizon", "acceleration_time", "moving_speed", "miss_distance"):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                raise ValueError(f"{name}={value} must be finite and > 0")
+
+
+def predicted_tip(
+    obstacle: Sequence[float], ahead: float, acceleration_time: float
+) -> Vector:
+    """O's tip `ahead` seconds from now, m.
+
+    The acceleration is taken to die out (Singer's model): held constant over
+    seconds, the noise of its estimate would throw the tip across the abdomen.
+    """
+    tau = acceleration_time
+    share = tau * tau * (ahead / tau - 1.0 + exp(-ahead / tau))
+    return along(
+        along(obstacle[0:3], ahead, velocity(obstacle)), share, acceleration(obstacle)
+    )
+
+
+def crossing(
+    guide: Sequence[float],
+    v1: Sequence[float],
+    obstacle: Sequence[float],
+    params: VelocityCorrectionsParams,
+) -> tuple[float, float, float]:
+    """Where and when O's shaft crosses the guide point's way.
+
+    Args:
+        guide: The guide signal (12).
+        v1: Velocity of the guide point, m/s.
+        obstacle: Estimate (17) of O.
+        params: Horizon and tolerances.
+
+    Returns:
+        (distance from M_R in m, time from now in s, degree in [0, 1] to which
+        there is a crossing); degree 0 if there is none.
+    """
+    none = (0.0, 0.0, 0.0)
+    speed = norm(v1)
+    if speed < 1e-9:
+        return none
+    g = fulcrum(obstacle)
+    a = sub(obstacle[0:3], g)
+    b = sub(predicted_tip(obstacle, params.horizon, params.acceleration_time), g)
+    n = cross(a, b)
+    n2 = dot(n, n)
+    approach = dot(v1, n) / speed
+    # O does not sweep, or the way lies in the plane that it sweeps.
+    if n2 < 1e-16 or approach * approach < 1e-6 * n2:
+        return none
+    m = sub(guide[0:3], g)
+    distance = -dot(m, n) / approach
+    x = along(m, distance / speed, v1)
+    # x = alpha a + beta b; alpha + beta = 1 on the line of O's tip.
+    alpha = dot(cross(x, b), n) / n2
+    beta = dot(cross(a, x), n) / n2
+    reach = alpha + beta
+    if reach < 1e-3:  # at or behind O's fulcrum
+        return none
+    time = params.horizon * beta / reach
+    miss = params.miss_distance
+    remaining = norm(sub(guide[9:12], guide[0:3]))
+    degree = min(
+        _ramp((distance + miss) / miss),
+        _ramp((remaining + miss - distance) / miss),
+        _ramp((norm(a) + miss - reach * norm(a)) / miss),
+        _ramp((time + 0.1) / 0.1),
+        _ramp(4.0 * (params.horizon - time) / params.horizon),
+        _ramp(norm(velocity(obstacle)) / params.moving_speed),
+    )
+    return max(distance, 0.0), max(time, 0.0), degree
+
+
+def _ramp(x: float) -> float:
+    return 0.0 if x < 0.0 else 1.0 if x > 1.0 else x
+
+
+class SpeedScale:
+    """Table II with its memberships: from a crossing to the share of v_1 kept."""
+
+    def __init__(self, params: VelocityCorrectionsParams) -> None:
+        self._distances = Partition(DISTANCES, params.distances)
+        self._times = Partition(TIMES, params.times)
+        scales = {s: [x] for s, x in zip(SPEEDS, params.scales, strict=True)}
+        self._table = RuleTable(TABLE_II, scales)
+
+    def __call__(self, distance: float, time: float) -> float:
+        """The share in [0, 1] for a crossing `distance` m and `time` s ahead."""
+        return self._table.infer(
+            self._times.degrees(time), self._distances.degrees(distance)
+        )[0]
+
+
+def velocity_correction(
+    params: VelocityCorrectionsParams,
+    scale: SpeedScale,
+    v1: Sequence[float],
+    guide: Sequence[float],
+    obstacle: Sequence[float],
+) -> Vector:
+    """v_2, m/s; zero where O is not known.
+
+    Args:
+        params: Parameters.
+        scale: Table II.
+        v1: Velocity of the guide point, m/s.
+        guide: The guide signal (12).
+        obstacle: Estimate (17) of O.
+    """
+    if not (usable(obstacle) and all_finite(v1, guide)):
+        return 0.0, 0.0, 0.0
+    distance, time, degree = crossing(guide, v1, obstacle, params)
+    if degree <= 0.0:
+        return 0.0, 0.0, 0.0
+    cut = -degree * (1.0 - scale(distance, time))
+    return cut * v1[0], cut * v1[1], cut * v1[2]
+
+
+class VelocityCorrections(Block):
+    """Slows the robot's tool where the obstacle tool is about to cross its way.
+
+    Bauzano et al., section 4.2, Table II; see the module. A pure map of its
+    inputs.
+
+    Port ``v1`` accepts the guide point's velocity v_1 (3), m/s, in W.
+    Port ``guide`` accepts the guide signal (12).
+    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
+    Port ``v2`` emits the correction v_2 (3), m/s, in W.
+    """
+
+    def __init__(self, params: VelocityCorrectionsParams | None = None) -> None:
+        """Builds the block.
+
+        Args:
+            params: Parameters; the defaults if None.
+
+        Raises:
+            ValueError: If a parameter is out of range.
+        """
+        super().__init__()
+        self._params = params or VelocityCorrectionsParams()
+        self._params.check()
+        self._scale = SpeedScale(self._params)
+        self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
+        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
+        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
+        self.vector_out(
+            "v2",
+            3,
+            self._calc_v2,
+            {
+                self._v1.ticket(),
+                self._guide.ticket(),
+                self._obstacle.ticket(),
+            },
+        )
+
+    def _calc_v2(self, context: Any) -> Vector:
+        return velocity_correction(
+            self._params,
+            self._scale,
+            self._v1.Eval(context).tolist(),
+            self._guide.Eval(context).tolist(),
+            self._obstacle.Eval(context).tolist(),
+        )

@@ -1,0 +1,215 @@
+"""Points, segments and shafts in plain floats, for the control loop.
+
+A control step works on a handful of 3-vectors; there plain Python floats are
+several times faster than numpy. Vectors are sequences of three floats in one
+common frame and are returned as tuples. Lengths in meters.
+"""
+
+from collections.abc import Sequence
+from math import hypot, isfinite, sqrt
+
+type Vector = tuple[float, float, float]
+
+# Below this share of |d1|^2 |d2|^2 two directions count as parallel
+# (sin^2 of their angle; 1e-12 is an angle of 1e-6 rad).
+_PARALLEL = 1e-12
+
+
+def all_finite(*vectors: Sequence[float]) -> bool:
+    """True if no element of any vector is NaN or infinite."""
+    # A sum with a NaN or an infinity in it is never finite.
+    return isfinite(sum(map(sum, vectors)))
+
+
+def dot(a: Sequence[float], b: Sequence[float]) -> float:
+    """The scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """The vector product a x b."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def sub(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """The difference a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def along(p: Sequence[float], t: float, d: Sequence[float]) -> Vector:
+    """The point p + t d."""
+    return p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
+
+
+def norm(a: Sequence[float]) -> float:
+    """The Euclidean length."""
+    return hypot(a[0], a[1], a[2])
+
+
+def unit(a: Sequence[float], otherwise: Vector = (0.0, 0.0, 0.0)) -> Vector:
+    """The direction of `a`, or `otherwise` where `a` has none (zero length)."""
+    length = hypot(a[0], a[1], a[2])
+    if length < 1e-12:
+        return otherwise
+    return a[0] / length, a[1] / length, a[2] / length
+
+
+def limited(a: Sequence[float], limit: float) -> Vector:
+    """`a`, shortened to the length `limit` where it is longer."""
+    length = hypot(a[0], a[1], a[2])
+    scale = 1.0 if length <= limit else limit / length
+    return a[0] * scale, a[1] * scale, a[2] * scale
+
+
+def any_perpendicular(a: Sequence[float]) -> Vector:
+    """A unit vector perpendicular to `a`, always the same for the same `a`."""
+    # Crossed with the axis that `a` is least aligned with.
+    x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
+    if x <= y and x <= z:
+        axis = (1.0, 0.0, 0.0)
+    elif y <= z:
+        axis = (0.0, 1.0, 0.0)
+    else:
+        axis = (0.0, 0.0, 1.0)
+    return unit(cross(a, axis), (1.0, 0.0, 0.0))
+
+
+def closest_on_segment(
+    p: Sequence[float], a: Sequence[float], b: Sequence[float]
+) -> tuple[float, float]:
+    """The point of segment a->b nearest to p.
+
+    Returns:
+        (t, distance): the point is a + t (b - a), t in [0, 1]; t = 0 for a
+        segment of zero length.
+    """
+    d = sub(b, a)
+    length2 = dot(d, d)
+    t = dot(sub(p, a), d) / length2 if length2 > 0.0 else 0.0
+    t = 0.0 if t < 0.0 else 1.0 if t > 1.0 else t
+    return t, norm(sub(along(a, t, d), p))
+
+
+def closest_points(
+    a0: Sequence[float], a1: Sequence[float], b0: Sequence[float], b1: Sequence[float]
+) -> tuple[float, float, float, Vector, Vector]:
+    """The closest points of the segments a0->a1 and b0->b1.
+
+    Crossing segments give distance 0. Where the closest pair is not unique
+    (parallel segments side by side) it is the one farthest along the first
+    segment, for a tool the one nearest to its tip. Segments of zero length
+    count as points.
+
+    Returns:
+        (s, t, distance, p_A, p_B): p_A = a0 + s (a1 - a0) and
+        p_B = b0 + t (b1 - b0) with s, t in [0, 1].
+    """
+    ux, uy, uz = a1[0] - a0[0], a1[1] - a0[1], a1[2] - a0[2]
+    vx, vy, vz = b1[0] - b0[0], b1[1] - b0[1], b1[2] - b0[2]
+    wx, wy, wz = a0[0] - b0[0], a0[1] - b0[1], a0[2] - b0[2]
+    a = ux * ux + uy * uy + uz * uz
+    b = ux * vx + uy * vy + uz * vz
+    c = vx * vx + vy * vy + vz * vz
+    d = ux * wx + uy * wy + uz * wz
+    e = vx * wx + vy * wy + vz * wz
+    if a * c <= 0.0 or a * c - b * b < _PARALLEL * a * c:
+        s, t = _closest_of_ends(a0, a1, b0, b1)
+    else:
+        # Ericson, Real-Time Collision Detection, 5.1.9: clamp s on the
+        # infinite second line, then t, then s again for the clamped t.
+        s = (b * e - c * d) / (a * c - b * b)
+        s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
+        t = (b * s + e) / c
+        if t < 0.0:
+            t = 0.0
+            s = -d / a
+            s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
+        elif t > 1.0:
+            t = 1.0
+            s = (b - d) / a
+            s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
+    p = (a0[0] + s * ux, a0[1] + s * uy, a0[2] + s * uz)
+    q = (b0[0] + t * vx, b0[1] + t * vy, b0[2] + t * vz)
+    return s, t, hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]), p, q
+
+
+def _closest_of_ends(
+    a0: Sequence[float], a1: Sequence[float], b0: Sequence[float], b1: Sequence[float]
+) -> tuple[float, float]:
+    """(s, t) for parallel or zero-length segments: an end is a closest point."""
+    t1, d1 = closest_on_segment(a1, b0, b1)
+    t0, d0 = closest_on_segment(a0, b0, b1)
+    s1, e1 = closest_on_segment(b1, a0, a1)
+    s0, e0 = closest_on_segment(b0, a0, a1)
+    least = min(d0, d1, e0, e1)
+    # Ties differ by rounding only: far below any tool's radius.
+    tie = least + 1e-9
+    pairs = [(1.0, t1, d1), (s1, 1.0, e1), (s0, 0.0, e0), (0.0, t0, d0)]
+    s, t, _ = max((pair for pair in pairs if pair[2] <= tie), key=lambda pair: pair[0])
+    return s, t
+
+
+def segment_triangle_distance(
+    p0: Sequence[float],
+    p1: Sequence[float],
+    a: Sequence[float],
+    b: Sequence[float],
+    c: Sequence[float],
+) -> float:
+    """Distance of the segment p0->p1 from the triangle abc; 0 if it pierces it.
+
+    The straight motion of a tool's tip from b to c under the fulcrum a sweeps
+    this triangle. A triangle without area counts as its edges.
+    """
+    n = cross(sub(b, a), sub(c, a))
+    area2 = dot(n, n)
+    least = min(
+        closest_points(p0, p1, a, b)[2],
+        closest_points(p0, p1, b, c)[2],
+        closest_points(p0, p1, c, a)[2],
+    )
+    if area2 <= 1e-24:
+        return least
+
+    def over_face(p: Sequence[float]) -> bool:
+        return (
+            dot(cross(sub(b, a), sub(p, a)), n) >= 0.0
+            and dot(cross(sub(c, b), sub(p, b)), n) >= 0.0
+            and dot(cross(sub(a, c), sub(p, c)), n) >= 0.0
+        )
+
+    h0 = dot(sub(p0, a), n)
+    h1 = dot(sub(p1, a), n)
+    if h0 * h1 <= 0.0 and h0 != h1:
+        if over_face(along(p0, h0 / (h0 - h1), sub(p1, p0))):
+            return 0.0
+    else:
+        for p, h in ((p0, h0), (p1, h1)):
+            if over_face(p):
+                least = min(least, abs(h) / sqrt(area2))
+    return least
+
+
+def shaft_point_velocity(
+    fraction: float, u: Sequence[float], v_tip: Sequence[float]
+) -> Vector:
+    """Velocity of the shaft's material point at `fraction` of its inserted length.
+
+    Insertion moves all of the shaft alike; turning about the fulcrum moves it
+    in proportion to the distance from the fulcrum.
+
+    Args:
+        fraction: Distance from the fulcrum over the tip's distance, in [0, 1].
+        u: Unit vector along the shaft.
+        v_tip: Velocity of the tip, m/s.
+    """
+    slide = (1.0 - fraction) * dot(u, v_tip)
+    return (
+        fraction * v_tip[0] + slide * u[0],
+        fraction * v_tip[1] + slide * u[1],
+        fraction * v_tip[2] + slide * u[2],
+    )

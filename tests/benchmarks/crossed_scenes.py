@@ -1,0 +1,215 @@
+"""Random scenes in which the obstacle tool O stands or moves across the robot's way.
+
+The recipe: a dome of 100 to 120 mm radius over a floor at z = -65 mm (frame W
+here has its origin in the dome's center). The fulcrums G_R and G_O lie on the
+dome within 65 degrees of its top, 60 mm or more apart. Start tip, target and O's
+tip lie inside, 80 to 160 mm from their fulcrums; the way is 30 mm or longer, and
+the straight motion touches O. The start pose is clear of O by 5 mm (10 where O
+moves), the final pose by 3 mm. A standing O is 26.5 mm or more from G_R. A moving
+O's tip wanders between random points for 7 s at a speed of 10 to 60 mm/s drawn for
+the scene, with 400 mm/s^2, always 30 mm or more from G_R, and comes to rest where
+it leaves the final pose free. Tools are 5 mm thick.
+
+Scene k of a set depends on the seed, the kind and k only.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin, sqrt
+
+import numpy as np
+
+from systems.common.geometry import (
+    Vector,
+    along,
+    closest_on_segment,
+    closest_points,
+    norm,
+    segment_triangle_distance,
+    sub,
+)
+
+CONTACT = 0.005
+"""Distance of the axes at contact, m: two radii of 2.5 mm."""
+
+KINDS = ("standing", "moving")
+_WANDER_TIME = 7.0
+_ACCELERATION = 0.4
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A straight rest-to-rest motion with a trapezoid of speed.
+
+    Attributes:
+        start: Time of departure, s.
+        p0: From, m.
+        p1: To, m.
+        speed: Cruising speed, m/s.
+    """
+
+    start: float
+    p0: Vector
+    p1: Vector
+    speed: float
+
+    def _shape(self) -> tuple[float, float, float]:
+        """(length, peak speed, duration)."""
+        length = norm(sub(self.p1, self.p0))
+        peak = min(self.speed, sqrt(_ACCELERATION * length))
+        return length, peak, length / peak + peak / _ACCELERATION if length else 0.0
+
+    @property
+    def end(self) -> float:
+        """Time of arrival, s."""
+        return self.start + self._shape()[2]
+
+    def at(self, time: float) -> tuple[Vector, Vector, Vector]:
+        """Position, velocity and acceleration at `time`."""
+        length, peak, duration = self._shape()
+        t = min(max(time - self.start, 0.0), duration)
+        ramp = peak / _ACCELERATION
+        if t < ramp:
+            way, v, a = 0.5 * _ACCELERATION * t * t, _ACCELERATION * t, _ACCELERATION
+        elif t <= duration - ramp:
+            way, v, a = peak * (t - 0.5 * ramp), peak, 0.0
+        else:
+            left = duration - t
+            way = length - 0.5 * _ACCELERATION * left * left
+            v, a = _ACCELERATION * left, -_ACCELERATION
+        if not self.start < time < self.start + duration:
+            v, a = 0.0, 0.0
+        zero = (0.0, 0.0, 0.0)
+        if length == 0.0:
+            return self.p0, zero, zero
+        d = sub(self.p1, self.p0)
+        return (
+            along(self.p0, way / length, d),
+            along(zero, v / length, d),
+            along(zero, a / length, d),
+        )
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One scene.
+
+    Attributes:
+        p_WGr: The robot's fulcrum, m.
+        p_WPr: The robot's tip at the start, m.
+        p_WPs: The target, m.
+        p_WGo: The obstacle tool's fulcrum, m.
+        legs: The motion of its tip; a single one of zero length if it stands.
+    """
+
+    p_WGr: Vector
+    p_WPr: Vector
+    p_WPs: Vector
+    p_WGo: Vector
+    legs: list[Leg]
+
+    @property
+    def rest_time(self) -> float:
+        """From when on O rests, s."""
+        return self.legs[-1].end
+
+    def obstacle_tip(self, time: float) -> tuple[Vector, Vector, Vector]:
+        """Position, velocity and acceleration of O's tip."""
+        for leg in self.legs:
+            if time < leg.end:
+                return leg.at(time)
+        return self.legs[-1].at(time)
+
+
+def scene(kind: str, seed: int, number: int) -> Scene:
+    """Draws a scene.
+
+    Args:
+        kind: "standing" or "moving".
+        seed: The set's seed.
+        number: Of the scene in its set.
+
+    Raises:
+        ValueError: If the kind is neither.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"kind={kind!r} must be one of {', '.join(KINDS)}")
+    rng = np.random.default_rng([seed, KINDS.index(kind), number])
+    while True:
+        drawn = _draw(rng, kind == "moving")
+        if drawn is not None:
+            return drawn
+
+
+def _draw(rng: np.random.Generator, moving: bool) -> Scene | None:
+    """One try; None if it breaks a rule."""
+    dome = rng.uniform(0.1, 0.12)
+    g_r, g_o = _fulcrum(rng, dome), _fulcrum(rng, dome)
+    if norm(sub(g_r, g_o)) < 0.06:
+        return None
+    start, goal, tip = (_tip(rng, dome, g) for g in (g_r, g_r, g_o))
+    if norm(sub(goal, start)) < 0.03:
+        return None
+    if segment_triangle_distance(g_o, tip, g_r, start, goal) >= CONTACT:
+        return None
+    room = 0.01 if moving else 0.005
+    if closest_points(g_r, start, g_o, tip)[2] < CONTACT + room:
+        return None
+    from_g_r = 0.03 if moving else 0.0265
+    if closest_on_segment(g_r, g_o, tip)[1] < from_g_r:
+        return None
+    if not moving:
+        if closest_points(g_r, goal, g_o, tip)[2] < CONTACT + 0.003:
+            return None
+        return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
+    legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
+    return Scene(g_r, start, goal, g_o, legs)
+
+
+def _fulcrum(rng: np.random.Generator, dome: float) -> Vector:
+    """A point on the dome, even over the cap of 65 degrees."""
+    z = rng.uniform(cos(65.0 * pi / 180.0), 1.0)
+    azimuth = rng.uniform(0.0, 2.0 * pi)
+    r = sqrt(1.0 - z * z)
+    return dome * r * cos(azimuth), dome * r * sin(azimuth), dome * z
+
+
+def _tip(rng: np.random.Generator, dome: float, p_WG: Sequence[float]) -> Vector:
+    """A point inside, even in volume, 80 to 160 mm from its fulcrum."""
+    while True:
+        x, y = rng.uniform(-dome, dome, 2)
+        z = rng.uniform(-0.065, dome)
+        p = (float(x), float(y), float(z))
+        if norm(p) <= dome and 0.08 <= norm(sub(p, p_WG)) <= 0.16:
+            return p
+
+
+def _wander(
+    rng: np.random.Generator,
+    dome: float,
+    g_o: Vector,
+    tip: Vector,
+    g_r: Vector,
+    goal: Vector,
+    from_g_r: float,
+) -> list[Leg]:
+    """Legs between random points for 7 s, the last one to a place out of the way."""
+    speed = float(rng.uniform(0.01, 0.06))
+    legs: list[Leg] = []
+    time = 0.0
+    while True:
+        p0 = legs[-1].p1 if legs else tip
+        leg = Leg(time, p0, _tip(rng, dome, g_o), speed)
+        if any(
+            closest_on_segment(g_r, g_o, along(p0, k / 20, sub(leg.p1, p0)))[1]
+            < from_g_r
+            for k in range(21)
+        ):
+            continue
+        last = leg.end >= _WANDER_TIME
+        if last and closest_points(g_r, goal, g_o, leg.p1)[2] < CONTACT + 0.003:
+            continue
+        legs.append(leg)
+        time = leg.end
+        if last:
+            return legs

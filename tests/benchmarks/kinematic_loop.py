@@ -1,0 +1,240 @@
+"""A kinematic loop round a planner: an ideal robot's tool among ideal tools.
+
+The robot's tip follows the commanded velocity within its limits, its shaft goes
+through a known fulcrum, and the obstacle's state is exact. What is left is the
+planner. Another planner, a constraint behind it or noise before it takes part by
+offering `step`.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from systems.auto_guidance.backward_movement import (
+    BackwardMovementParams,
+    backward_movement,
+    contact_velocity,
+)
+from systems.auto_guidance.fuzzy_arbiter import (
+    Decision,
+    FuzzyArbiterParams,
+    arbitrate,
+)
+from systems.auto_guidance.go_to_target import GoToTargetParams, go_to_target
+from systems.auto_guidance.velocity_corrections import (
+    SpeedScale,
+    VelocityCorrectionsParams,
+    velocity_correction,
+)
+from systems.common.geometry import (
+    Vector,
+    along,
+    closest_points,
+    dot,
+    limited,
+    norm,
+    sub,
+    unit,
+)
+from tests.benchmarks.crossed_scenes import CONTACT, Scene
+
+PLANNER_PERIOD = 1.0 / 60.0
+
+
+class Planner(Protocol):
+    """What the loop asks of a planner; a new one is made for every scene."""
+
+    def step(
+        self,
+        dt: float,
+        robot_tool: Sequence[float],
+        obstacle: Sequence[float],
+        target: Sequence[float],
+    ) -> Vector:
+        """The velocity of the robot's tip for the next `dt` seconds, m/s.
+
+        Args:
+            dt: Length of the step, s.
+            robot_tool: G_R, P_R (6), m.
+            obstacle: Estimate (17) of O.
+            target: Estimate (17) of S.
+        """
+
+
+@dataclass
+class LocalPlanner:
+    """The paper's local planner (Figure 4): the functions of the four blocks.
+
+    Attributes:
+        go: Parameters of go to target.
+        corrections: Of the velocity corrections.
+        backward: Of the backward movement.
+        arbiter: Of the fuzzy arbiter.
+        field_only: Commands v_1 alone, for comparison.
+        v1, v2, v3, v_R: The last step's velocities of the guide point, m/s.
+        guide: The last step's guide signal (12).
+        weights: The last step's c_1, c_2, c_3.
+    """
+
+    go: GoToTargetParams = field(default_factory=GoToTargetParams)
+    corrections: VelocityCorrectionsParams = field(
+        default_factory=VelocityCorrectionsParams
+    )
+    backward: BackwardMovementParams = field(default_factory=BackwardMovementParams)
+    arbiter: FuzzyArbiterParams = field(default_factory=FuzzyArbiterParams)
+    field_only: bool = False
+
+    def __post_init__(self) -> None:
+        """Starts from rest."""
+        self._scale = SpeedScale(self.corrections)
+        self._decision = Decision(self.arbiter)
+        self._v1_tip: Vector = (0.0, 0.0, 0.0)
+        self._v_tip: Vector = (0.0, 0.0, 0.0)
+        self.v3: Vector = (0.0, 0.0, 0.0)
+
+    def step(
+        self,
+        dt: float,
+        robot_tool: Sequence[float],
+        obstacle: Sequence[float],
+        target: Sequence[float],
+    ) -> Vector:
+        """The velocity of the robot's tip, see `Planner`."""
+        self._v1_tip, self.guide = go_to_target(
+            self.go, self._v1_tip, dt, robot_tool, obstacle, target
+        )
+        zero = (0.0, 0.0, 0.0)
+        s = self.guide[7]
+        self.v1 = along(zero, s, self._v1_tip)
+        if self.field_only:
+            self.v2, self.v_R, self.weights = zero, self.v1, [1.0, 0.0, 0.0]
+            return self._v1_tip
+        self.v2 = velocity_correction(
+            self.corrections, self._scale, self.v1, self.guide, obstacle
+        )
+        v_o = contact_velocity(self.guide, obstacle)
+        self.v3 = backward_movement(self.backward, self.v3, dt, v_o)
+        self.weights, self._v_tip, _ = arbitrate(
+            self.arbiter,
+            self._decision,
+            self._v_tip,
+            dt,
+            (self.v1, self.v2, self.v3),
+            self.guide,
+            robot_tool,
+            obstacle,
+            target,
+        )
+        self.v_R = along(zero, s, self._v_tip)
+        return self._v_tip
+
+
+def estimate(
+    p: Sequence[float],
+    fulcrum: Sequence[float],
+    v: Sequence[float] = (0.0, 0.0, 0.0),
+    a: Sequence[float] = (0.0, 0.0, 0.0),
+) -> list[float]:
+    """An exact estimate (17) of a tool."""
+    return [*p, *v, *a, *fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0]
+
+
+@dataclass(frozen=True)
+class Robot:
+    """Limits of the ideal robot.
+
+    Attributes:
+        max_speed: Of the tip, m/s.
+        max_turning: Of the shaft, rad/s.
+        least_insertion: m.
+    """
+
+    max_speed: float = 0.1
+    max_turning: float = 1.0
+    least_insertion: float = 0.015
+
+    def moved(self, g: Vector, p: Vector, v: Sequence[float], dt: float) -> Vector:
+        """The tip after `dt` seconds at velocity v within the limits."""
+        shaft = sub(p, g)
+        q = norm(shaft)
+        u = unit(shaft)
+        along_u = dot(v, u)
+        turning = limited(
+            (v[0] - along_u * u[0], v[1] - along_u * u[1], v[2] - along_u * u[2]),
+            q * self.max_turning,
+        )
+        velocity = limited(along(turning, along_u, u), self.max_speed)
+        shaft = sub(along(p, dt, velocity), g)
+        q = norm(shaft)
+        if q < self.least_insertion:
+            return along(g, self.least_insertion / q, shaft)
+        return along(g, 1.0, shaft)
+
+
+@dataclass
+class Outcome:
+    """What came of a scene.
+
+    Attributes:
+        reached: The tip is within 1 mm of the target with O at rest, and no
+            contact was made.
+        contact: The tools touched.
+        clearance: Least distance of the surfaces, m; what it was at contact.
+        time: Of the first arrival within 1 mm, s; None without one.
+    """
+
+    reached: bool
+    contact: bool
+    clearance: float
+    time: float | None
+
+
+def run(
+    scene: Scene,
+    planner: Planner,
+    robot: Robot | None = None,
+    time_limit: float = 15.0,
+    watch: Callable[[float, Vector], None] | None = None,
+) -> Outcome:
+    """Runs a scene to its end: contact, arrival with O at rest, or the limit.
+
+    The planner is asked at 60 Hz; motion and clearance are followed at 240 Hz.
+
+    Args:
+        scene: The scene.
+        planner: A fresh planner.
+        robot: The robot's limits.
+        time_limit: In seconds.
+        watch: Called at every planner step with the time and the tip.
+    """
+    robot = robot or Robot()
+    tip = scene.p_WPr
+    clearance = float("inf")
+    arrival: float | None = None
+    target = estimate(scene.p_WPs, scene.p_WPs)
+    substeps = 4
+    dt = PLANNER_PERIOD / substeps
+    for k in range(round(time_limit / PLANNER_PERIOD)):
+        time = k * PLANNER_PERIOD
+        p, v, a = scene.obstacle_tip(time)
+        v_tip = planner.step(
+            PLANNER_PERIOD,
+            [*scene.p_WGr, *tip],
+            estimate(p, scene.p_WGo, v, a),
+            target,
+        )
+        if watch:
+            watch(time, tip)
+        for i in range(substeps):
+            tip = robot.moved(scene.p_WGr, tip, v_tip, dt)
+            p = scene.obstacle_tip(time + (i + 1) * dt)[0]
+            axes = closest_points(scene.p_WGr, tip, scene.p_WGo, p)[2]
+            clearance = min(clearance, axes - CONTACT)
+        if clearance <= 0.0:
+            return Outcome(False, True, clearance, None)
+        near = norm(sub(tip, scene.p_WPs)) < 1e-3
+        if near and arrival is None:
+            arrival = time + PLANNER_PERIOD
+        if near and norm(v_tip) < 2e-3 and time > scene.rest_time:
+            return Outcome(True, False, clearance, arrival)
+    return Outcome(False, False, clearance, arrival)
