@@ -114,6 +114,7 @@ def simulate(
         recorder.draw(context)
         for frame in range(1, int(scenario.duration * study.frame_rate) + 2):
             time = min(frame / study.frame_rate, scenario.duration)
+            study.adjust(scenario, station, context)
             start = perf_counter()
             simulator.AdvanceTo(time)
             run.wall_time += perf_counter() - start

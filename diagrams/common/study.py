@@ -9,6 +9,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 
 STUDIES = {
     "gauze": "diagrams.gauze.study",
+    "wrist": "diagrams.wrist.study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
 
@@ -42,6 +43,8 @@ class Study:
             for `planner_step_median`; empty if there is none.
         required: Dotted keys that a scenario's file must have.
         view: The replay's camera.
+        adjust: Called with scenario, diagram and root context before every frame,
+            for parameters of the plant that change with time.
         frame_rate: Frames of the replay per simulated second [1/s].
     """
 
@@ -55,6 +58,7 @@ class Study:
     plots: Callable[[Any], dict[str, Any]]
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
+    adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
     required: tuple[str, ...] = ("system", "duration")
     view: View = field(default_factory=View)
     frame_rate: float = 30.0

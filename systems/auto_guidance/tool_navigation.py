@@ -30,6 +30,9 @@ REASONS = {
     5: "target outside the view cone",
     6: "arm does not follow",
     7: "waiting for the tracker's first frame",
+    8: "force on the wall over its limit",
+    9: "wrist sensor lost",
+    10: "probing the wall",
 }
 """Why the robot stands: the code on port ``stop`` and its text."""
 
@@ -208,6 +211,9 @@ class ToolNavigation(Block):
 
     Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
 
+    Port ``permission`` accepts the share of its speed that the passive wrist allows
+    and why it must wait, a key of `REASONS` or 0 (2); free if not connected.
+
     Port ``tool`` emits the commanded p_WP [m], shaft direction u_W, v_WP [m/s],
     du_W/dt [1/s] and the time [s] they hold at (13).
 
@@ -250,6 +256,7 @@ class ToolNavigation(Block):
         self._view_cone = self.vector_in(
             "view_cone", [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.6]
         )
+        self._permission = self.vector_in("permission", [1.0, 0.0])
         u, _ = unit(p_WP[0] - p_WG[0], p_WP[1] - p_WG[1], p_WP[2] - p_WG[2])
         state = self.DeclareDiscreteState([*p_WP, *u, *[0.0] * 6, 0.0, MOVING])
         self.vector_out("tool", 13, self._calc_tool, {self.xd_ticket()})
@@ -312,13 +319,19 @@ class ToolNavigation(Block):
             view_cone,
             p,
         )
+        pace = 1.0
+        if self._permission.HasValue(context):
+            pace, code = self._permission.Eval(context).tolist()
+            if stop == MOVING and pace <= 0.0:
+                stop = int(code)
         p_WG = (robot[0], robot[1], robot[2])
         if not all(map(math.isfinite, p_WG)):
             p_WG = (p[0] - old[3], p[1] - old[4], p[2] - old[5])
         if stop == MOVING:
             s = max(guide[7], params.min_proportion)
             wanted = (v_R[0] / s, v_R[1] / s, v_R[2] / s)
-            wanted = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
+            x, y, z = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
+            wanted = (pace * x, pace * y, pace * z)
         else:
             wanted = (0.0, 0.0, 0.0)
         v = approach(v, wanted, params.acceleration * params.period)

@@ -36,9 +36,7 @@ class BreathingFit:
     residual: float
 
 
-def _basis(
-    rate: np.ndarray, samples: int, period: float, harmonics: int
-) -> np.ndarray:
+def _basis(rate: np.ndarray, samples: int, period: float, harmonics: int) -> np.ndarray:
     """Columns 1, cos, -sin, ... for each rate, shape (rates, samples, 1 + 2 h)."""
     t = (np.arange(samples) - (samples - 1)) * period
     phase = 2.0 * np.pi * rate[:, None] * t

@@ -294,9 +294,7 @@ class FulcrumFilter:
                 w[j] -= rate * xs[i + 3 + j]
         depth = dot(u, r)
         w = [w[0] - depth * du[0], w[1] - depth * du[1], w[2] - depth * du[2]]
-        f1, f2, m1, m2, _ = lateral_wrench(
-            r, w, u, a.e1, a.e2, stiffness, a.damping
-        )
+        f1, f2, m1, m2, _ = lateral_wrench(r, w, u, a.e1, a.e2, stiffness, a.damping)
         k1, k2 = stiffness * dot(a.e1, r), stiffness * dot(a.e2, r)
         # At forces in the noise the moment's slope by the depth is a guess that
         # multiplies itself and would pull the depth towards the sensor.

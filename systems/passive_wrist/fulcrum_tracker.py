@@ -159,6 +159,22 @@ class FulcrumTracker:
             f.to_first_force(x, P, sample)
         return z
 
+    def coast(self, z: np.ndarray) -> np.ndarray:
+        """One period without a reading."""
+        z = z.copy()
+        f = self.filter
+        n = f.n
+        aux = z[self._aux : self._parts]
+        if aux[0] != BEFORE:
+            known = aux[0] == BREATHING
+            walk = aux[11] if known else self.p.wall_walk
+            parts = self._part_walks(z) if known else []
+            P = z[n : self._record].reshape(n, n)
+            f.predict(z[:n], P, self.p.period, walk, parts)
+            aux[5], aux[12] = 0.0, 0.0  # a record must have no gaps
+            z[self._sums : self._aux] = 0.0
+        return z
+
     def _part_walks(self, z: np.ndarray) -> list[float]:
         rate = self.p.amplitude_walk
         return [rate * max(a, 3e-4) for a in z[self._parts :].tolist()]
@@ -182,7 +198,7 @@ class FulcrumTracker:
         ]
         aux = z[self._aux : self._parts]
         aux[12] += 1.0
-        if aux[1] % self._every != 0.0:
+        if aux[12] < self._every:
             return
         record = z[self._record : self._sums].reshape(_RECORD, 13)
         record[:-1] = record[1:]

@@ -241,19 +241,26 @@ class WristLaw:
     def _move_pivot(
         self, s: list[float], target: Vector, velocity: Vector, ratio: float
     ) -> None:
-        """Moves the pivot to its target within the wrist's limits."""
+        """Moves the pivot to its target within the wrist's limits.
+
+        What is fed forward is the target's own velocity: a difference of two
+        estimates would send their noise twice. Only while the pivot cannot keep up
+        it is the pivot's.
+        """
         p, dt = self.p, self.p.period
         fastest = p.wrist_speed * ratio
         hardest = p.wrist_acceleration * ratio
-        # Where a pivot moving with the target's velocity would be.
-        error = [target[k] - s[k] - s[3 + k] * 0.0 for k in (0, 1, 2)]
-        wanted = [error[k] / dt for k in (0, 1, 2)]
-        over = [wanted[k] - velocity[k] for k in (0, 1, 2)]
-        size = sqrt(dot(over, over))
-        far = sqrt(dot(error, error))
-        braking = sqrt(2.0 * hardest * far)
-        if size > braking > 0.0:  # approach no faster than it can brake
-            wanted = [velocity[k] + over[k] * braking / size for k in (0, 1, 2)]
+        error = [target[k] - s[k] for k in (0, 1, 2)]
+        over = [error[k] / dt - velocity[k] for k in (0, 1, 2)]
+        excess = sqrt(dot(over, over))
+        braking = sqrt(2.0 * hardest * sqrt(dot(error, error)))
+        if excess <= max(hardest * dt, 0.2 * fastest):  # keeps up
+            s[0:3], s[3:6] = target, velocity
+            return
+        # Approaches no faster than it can brake, than the wrist may move, and than
+        # it can speed up.
+        share = min(1.0, braking / excess)
+        wanted = [velocity[k] + share * over[k] for k in (0, 1, 2)]
         speed = sqrt(dot(wanted, wanted))
         if speed > fastest:
             wanted = [w * fastest / speed for w in wanted]

@@ -24,7 +24,9 @@ def ventilator(phase: float) -> float:
     phase %= 1.0
     if phase < 0.4:
         return -float(np.cos(pi * phase / 0.4))
-    return 2.0 * exp(-(phase - 0.4) / 0.12) - 1.0 - 2.0 * exp(-5.0) * (phase - 0.4) / 0.6
+    return (
+        2.0 * exp(-(phase - 0.4) / 0.12) - 1.0 - 2.0 * exp(-5.0) * (phase - 0.4) / 0.6
+    )
 
 
 @dataclass
