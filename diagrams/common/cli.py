@@ -120,11 +120,11 @@ def run_command(arguments: argparse.Namespace) -> int:
 def diagram_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar diagram`."""
     from diagrams.common.block_diagram import draw_block_diagram
-    from diagrams.common.study import get_study
+    from diagrams.common.study import build
 
     scenario = load_scenario(arguments.name)
     out = arguments.out or Path("out") / f"{default_name(arguments.name)}.svg"
-    draw_block_diagram(get_study(scenario.system).make_diagram(scenario), out)
+    draw_block_diagram(build(scenario), out)
     print(out)
     return 0
 

@@ -21,7 +21,7 @@ from pydrake.systems.primitives import LogVectorOutput
 from diagrams.common import metrics, replay
 from diagrams.common.plots import save_figure
 from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
-from diagrams.common.study import Study, get_study
+from diagrams.common.study import Study, build, get_study
 from systems.common.stopwatch import STOPWATCH
 
 INTEGRATOR = SimulatorConfig(
@@ -93,10 +93,11 @@ def simulate(
     check_scenario(scenario)
     study = get_study(scenario.system)
     builder = DiagramBuilder()
-    station = builder.AddNamedSystem("station", study.make_diagram(scenario))
+    station = builder.AddNamedSystem("station", build(scenario))
     sinks = {
         port: LogVectorOutput(station.GetOutputPort(port), builder, study.log_period)
         for port in study.signals
+        if port not in study.optional or station.HasOutputPort(port)
     }
     for port, sink in sinks.items():
         sink.set_name(f"log({port})")

@@ -36,6 +36,7 @@ class Study:
         measure: The figures of a finished run, flat and in SI units.
         signals: Exported ports to log: port name to column names. A
             one-element port's column is the port's name itself.
+        optional: Those of the signals that only some scenarios' diagrams export.
         log_period: Period of the log [s], on the control clock.
         plots: Makes the figures of a run, by file name without ending.
         decorate: Adds trails, arrows and the like to a recording.
@@ -58,10 +59,25 @@ class Study:
     plots: Callable[[Any], dict[str, Any]]
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
+    optional: frozenset[str] = frozenset()
     adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
     required: tuple[str, ...] = ("system", "duration")
     view: View = field(default_factory=View)
     frame_rate: float = 30.0
+
+
+def build(scenario: Any) -> Any:
+    """Makes a scenario's diagram.
+
+    Raises:
+        ScenarioError: If a block or a plant refuses one of its parameters.
+    """
+    try:
+        return get_study(scenario.system).make_diagram(scenario)
+    except ScenarioError:
+        raise
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
 
 
 def get_study(name: Any) -> Study:

@@ -54,7 +54,10 @@ def make_wrist_diagram(
         {
             "arc_navigation": ArcNavigation(scenario.arcs, robot.p_WP, guess),
             "joint_commands": JointCommands(
-                scenario.joints, bedside.posture, scenario.arm, scenario.instrument
+                scenario.joints,
+                bedside.posture.tolist(),
+                scenario.arm,
+                scenario.instrument,
             ),
             "robot_location": RobotLocation(scenario.instrument),
         },

@@ -5,10 +5,10 @@ from typing import Any
 from diagrams.common.bedside import stiffen
 from diagrams.common.study import Study, View
 from diagrams.common.wrist import WRIST_SIGNALS
+from diagrams.common.wrist_metrics import wrist_figures
+from diagrams.common.wrist_replay import decorate_wrist
 from diagrams.wrist.diagram import make_wrist_diagram
-from diagrams.wrist.metrics import measure
 from diagrams.wrist.plots import plots
-from diagrams.wrist.replay import decorate
 from diagrams.wrist.scenario import WristScenario, check
 
 XYZ = ("x", "y", "z")
@@ -20,9 +20,9 @@ SIGNALS: dict[str, tuple[str, ...]] = WRIST_SIGNALS | {
 }
 
 
-def adjust(scenario: Any, station: Any, context: Any) -> None:
-    """Between frames: the trocar's stiffness of the moment."""
-    stiffen(scenario, station, context)
+def measure(run: Any) -> dict[str, Any]:
+    """The figures of a run."""
+    return wrist_figures(run, run.scenario.measure_from, run.scenario.event)
 
 
 STUDY = Study(
@@ -34,9 +34,9 @@ STUDY = Study(
     signals=SIGNALS,
     log_period=1.0 / 120.0,
     plots=plots,
-    decorate=decorate,
+    decorate=decorate_wrist,
     controller="passive_wrist",
-    adjust=adjust,
+    adjust=stiffen,
     required=("system", "duration", "wrist", "robot.p_WG", "robot.p_WP"),
     view=View(camera=(0.5, -0.62, 0.16), target=(0.0, 0.0, -0.02)),
 )

@@ -41,7 +41,7 @@ class AbdomenParams:
 
     Attributes:
         stiffness: K, lateral stiffness of the trocar, in N/m.
-        damping: D, in N s/m.
+        damping: D, in N s/m. Over 10, CENIC needs more steps, or a heavier sleeve.
         seal_friction: Dry friction along the shaft, in N; 0 for none.
         seal_viscosity: Friction along the shaft that grows with speed, in N s/m.
         sleeve_mass: In kg. Light, for the sensor feels its inertia; below 20 g the
@@ -62,7 +62,7 @@ class AbdomenParams:
         """Raises ValueError for a value that cannot be."""
         bounds = {
             "stiffness": (1.0, 1e5),
-            "damping": (0.0, 1e3),
+            "damping": (0.0, 100.0),
             "seal_friction": (0.0, 20.0),
             "seal_viscosity": (0.0, 100.0),
             "sleeve_mass": (0.005, 0.2),

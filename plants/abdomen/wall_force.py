@@ -10,7 +10,7 @@ from typing import Any
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import LeafSystem, ValueProducer
 
 from plants.abdomen.abdomen import Abdomen
 
@@ -52,7 +52,7 @@ class WallForce(LeafSystem):
     ``body_spatial_velocities`` the plant's output of that name.
     Port ``force`` emits the true force of the wall on the shaft, across the shaft,
     in N, world frame (3). The sleeve's own inertia and the bushing's turning rate
-    are left out (5 g, and D times millimetres per second).
+    are left out (20 g, and D times millimetres per second).
     Port ``fulcrum_error`` emits the distance of the shaft's line from the true
     fulcrum in m (1).
     Port ``fulcrum`` emits the true fulcrum p_WI in m and its velocity in m/s (6).
@@ -79,17 +79,36 @@ class WallForce(LeafSystem):
         self._velocities = self.DeclareAbstractInputPort(
             "body_spatial_velocities", Value([SpatialVelocity()])
         )
-        poses = self._poses.ticket()
+        self._lever = self.DeclareCacheEntry(
+            "lever",
+            ValueProducer(
+                allocate=lambda: Value(object()),
+                calc=lambda context, value: value.set_value(self._calc_lever(context)),
+            ),
+            {self._poses.ticket()},
+        )
         self.DeclareVectorOutputPort(
             "force",
             3,
             self._calc_force,
-            {poses, self._velocities.ticket(), self.time_ticket()},
+            {self._poses.ticket(), self._velocities.ticket(), self.time_ticket()},
         )
-        self.DeclareVectorOutputPort("fulcrum_error", 1, self._calc_error, {poses})
         self.DeclareVectorOutputPort(
-            "fulcrum", 6, self._calc_fulcrum, {poses, self._velocities.ticket()}
+            "fulcrum_error", 1, self._calc_error, {self._poses.ticket()}
         )
+        self.DeclareVectorOutputPort(
+            "fulcrum",
+            6,
+            self._calc_fulcrum,
+            {self._poses.ticket(), self._velocities.ticket()},
+        )
+
+    def _calc_lever(self, context: Any) -> tuple[Vector, Vector]:
+        """From the sleeve to the fulcrum, and the shaft's axis, in W."""
+        poses = self._poses.Eval(context)
+        sleeve = poses[self._sleeve]
+        p = poses[self._wall].translation() - sleeve.translation()
+        return p.tolist(), sleeve.rotation().col(2).tolist()
 
     def _calc_force(self, context: Any, output: Any) -> None:
         velocities = self._velocities.Eval(context)
@@ -97,13 +116,13 @@ class WallForce(LeafSystem):
             velocities[self._wall].translational()
             - velocities[self._sleeve].translational()
         )
-        p, u = self._lever(context)
+        p, u = self._lever.Eval(context)
         stiffness = self._stiffness * self._factor(context.get_time())
         force, _ = lateral_force(p, u, v.tolist(), stiffness, self._damping)
         output.SetFromVector(force)
 
     def _calc_error(self, context: Any, output: Any) -> None:
-        p, u = self._lever(context)
+        p, u = self._lever.Eval(context)
         _, error = lateral_force(p, u, (0.0, 0.0, 0.0), 0.0, 0.0)
         output.SetFromVector([error])
 
@@ -111,13 +130,6 @@ class WallForce(LeafSystem):
         p_WI = self._poses.Eval(context)[self._wall].translation()
         v_WI = self._velocities.Eval(context)[self._wall].translational()
         output.SetFromVector([*p_WI, *v_WI])
-
-    def _lever(self, context: Any) -> tuple[Vector, Vector]:
-        """From sleeve to fulcrum, and the shaft's axis, in W."""
-        poses = self._poses.Eval(context)
-        sleeve = poses[self._sleeve]
-        p = poses[self._wall].translation() - sleeve.translation()
-        return p.tolist(), sleeve.rotation().col(2).tolist()
 
 
 def add_wall_force(

@@ -23,14 +23,20 @@ from plants.common.models import add_model
 class ArmParams:
     """Servo gains of the arm.
 
+    With friction the defaults have one time constant, 11 ms, at every joint: a shaft
+    that turns about the trocar moves the proximal joints far more than its tip, and
+    what they lag then cancels in the wrist. In the postures that the trocar allows,
+    every joint has at least 14 Hz of bandwidth and every mode a damping ratio over
+    0.55.
+
     Attributes:
         kp: Stiffness of each joint in Nm/rad.
         kd: Damping of each joint in Nm s/rad, on top of the joint's friction.
     """
 
-    kp: list[float] = field(default_factory=lambda: [4e4, 4e4, 2e4, 2e4, 3e3, 3e3, 1e3])
+    kp: list[float] = field(default_factory=lambda: [1e5, 1e5, 4e4, 4e4, 3e3, 3e3, 1e3])
     kd: list[float] = field(
-        default_factory=lambda: [800.0, 800.0, 330.0, 330.0, 14.0, 14.0, 4.0]
+        default_factory=lambda: [1090.0, 1090.0, 435.0, 435.0, 31.0, 31.0, 9.0]
     )
 
     def check(self) -> None:
@@ -101,7 +107,7 @@ class SetPoint:
         q_sent = q_d + (kd + b) / kp v_d + tau / kp,   v_sent = 0.
 
     A set-point that is held for a period is meant for the hold's end: CENIC, at an
-    accuracy of 1e-2, steps from one control instant to the next, and its implicit
+    accuracy of 1e-3, steps from one control instant to the next, and its implicit
     step arrives where the set-point says. (An integrator with many steps to a hold
     arrives in its middle, and then runs up to half a period ahead.)
     """

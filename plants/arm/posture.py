@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.multibody.inverse_kinematics import InverseKinematics
-from pydrake.solvers import Solve
+from pydrake.solvers import SnoptSolver, SolverOptions
 
 from plants.arm.parameters import JOINTS, POSITION_LIMIT, READY_POSTURE
 
@@ -46,8 +46,10 @@ def home_posture(
     u = (target - fulcrum) / inserted
     ik = InverseKinematics(plant, with_joint_limits=True)
     world = plant.world_frame()
-    ik.AddPositionConstraint(tip, np.zeros(3), world, target - 1e-6, target + 1e-6)
-    ik.AddAngleBetweenVectorsConstraint(tip, [0.0, 0.0, 1.0], world, u, 0.0, 1e-6)
+    ik.AddPositionConstraint(tip, np.zeros(3), world, target, target)
+    # A far point of the shaft's line: on the tip's z axis, behind the tip.
+    behind = [np.array([0.0, 0.0, z]) for z in (-1.0, 0.0)]
+    ik.AddPositionConstraint(world, target - 0.4 * u, tip, *behind)
     start = plant.GetJointByName("joint1", arm).position_start()
     q = ik.q()[start : start + JOINTS]
     near = np.asarray(READY_POSTURE if seed is None else seed, float)
@@ -57,7 +59,9 @@ def home_posture(
     guess = np.zeros(plant.num_positions())
     guess[start : start + JOINTS] = near
     ik.prog().SetInitialGuess(ik.q(), guess)
-    result = Solve(ik.prog())
+    options = SolverOptions()
+    options.SetOption(SnoptSolver.id(), "Major feasibility tolerance", 1e-9)
+    result = SnoptSolver().Solve(ik.prog(), None, options)
     if not result.is_success():
         raise ValueError(
             f"home_posture: no posture puts the tip at {target.round(4).tolist()} "

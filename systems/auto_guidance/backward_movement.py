@@ -66,17 +66,38 @@ class BackwardMovementParams:
 
 
 def contact_velocity(guide: Sequence[float], obstacle: Sequence[float]) -> Vector:
-    """v_O, the velocity of O's material point M_O, m/s; zero if O is not known."""
-    if not (usable(obstacle) and all_finite(guide)):
-        return 0.0, 0.0, 0.0
+    """v_O, the velocity of O's material point M_O, m/s.
+
+    Args:
+        guide: The guide signal (12).
+        obstacle: A usable estimate (17) of O.
+    """
     o = unit(sub(obstacle[0:3], fulcrum(obstacle)))
     return shaft_point_velocity(guide[8], o, velocity(obstacle))
 
 
 def backward_movement(
-    params: BackwardMovementParams, v3: Sequence[float], dt: float, v_o: Sequence[float]
+    params: BackwardMovementParams,
+    v3: Sequence[float],
+    dt: float,
+    guide: Sequence[float],
+    obstacle: Sequence[float],
 ) -> Vector:
-    """v_3 after a step of `dt` seconds with the obstacle's velocity v_O, m/s."""
+    """One step of the behaviour.
+
+    Args:
+        params: Parameters.
+        v3: v_3 before the step, m/s.
+        dt: Length of the step, s.
+        guide: The guide signal (12).
+        obstacle: Estimate (17) of O; without a usable one v_O counts as zero.
+
+    Returns:
+        v_3 after the step, m/s.
+    """
+    v_o: Vector = (0.0, 0.0, 0.0)
+    if usable(obstacle) and all_finite(guide):
+        v_o = contact_velocity(guide, obstacle)
     if params.form == "printed":
         return along(v3, params.gain * dt, v_o)
     # The exact solution for a v_O that is constant over the step.
@@ -126,10 +147,13 @@ class BackwardMovement(Block):
 
     def _calc_v3(self, context: Any) -> Vector:
         *v3, t_last = context.get_discrete_state_vector().value().tolist()
-        v_o = contact_velocity(
-            self._guide.Eval(context).tolist(), self._obstacle.Eval(context).tolist()
+        return backward_movement(
+            self._params,
+            v3,
+            context.get_time() - t_last,
+            self._guide.Eval(context).tolist(),
+            self._obstacle.Eval(context).tolist(),
         )
-        return backward_movement(self._params, v3, context.get_time() - t_last, v_o)
 
     def _update(self, context: Any) -> list[float]:
         return [*self._v3.Eval(context).tolist(), context.get_time()]

@@ -90,8 +90,9 @@ class FuzzyArbiterParams:
         distances: Centers of close, near and far, m, in rho less the contact
             distance.
         contact_distance: rho at contact, m: the sum of both tools' radii.
-        moving_speed: Speed from which on a direction counts in full, m/s; in
-            proportion below. Of M_O for the obstacle, of the tip for the robot.
+        moving_speed: Speed from which on a direction counts in full, m/s. Of the
+            tip for the robot, in proportion below; of M_O for the obstacle, not at
+            all below half of it.
         closing_speed: Closing speed at which the gated table counts in full, m/s.
         max_speed: v_max of the tip, m/s.
         max_acceleration: Of the tip's commanded velocity, m/s^2.
@@ -103,7 +104,7 @@ class FuzzyArbiterParams:
     contact_distance: float = 0.005
     moving_speed: float = 0.01
     closing_speed: float = 0.01
-    max_speed: float = 0.1
+    max_speed: float = 0.06
     max_acceleration: float = 1.0
 
     def check(self) -> None:
@@ -202,9 +203,12 @@ class Decision:
         """(c_1, c_2, c_3) for finite inputs and a known obstacle."""
         params = self._params
         v_o = contact_velocity(guide, obstacle)
+        # The tremor and the estimate's noise of a tool at rest do not count.
+        alert = min(1.0, 2.0 * norm(v_o) / params.moving_speed - 1.0)
+        if alert <= 0.0:
+            return [1.0, 0.0, 0.0]
         x, y = axes(guide)
         r_y, o_y = dot(v1, y), dot(v_o, y)
-        alert = min(1.0, norm(v_o) / params.moving_speed)
         if params.table == "gated":
             alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
         if alert <= 0.0:

@@ -93,7 +93,7 @@ class GoToTargetParams:
     influence_distance: float = 0.025
     contact_distance: float = 0.005
     damping: float = 60.0
-    max_speed: float = 0.1
+    max_speed: float = 0.06
     max_acceleration: float = 1.0
     goal_distance_floor: float = 0.008
     proportion_floor: float = 0.1
@@ -206,10 +206,10 @@ def corrected_force(
     nx = a * (goal[0] - e * n_o[0]) - _TIE * (u[0] - out * n_o[0])
     ny = a * (goal[1] - e * n_o[1]) - _TIE * (u[1] - out * n_o[1])
     nz = a * (goal[2] - e * n_o[2]) - _TIE * (u[2] - out * n_o[2])
-    size = hypot(nx, ny, nz)
-    # It fades near the goal, where its direction would flip at every step.
+    # It fades near the goal and where goal and fixed side cancel: there its
+    # direction would flip at every step.
     fade = r_tip / floor if r_tip < floor else 1.0
-    slide = 0.5 * k_r * gap * gap * fade / (s * size) if size > 1e-9 else 0.0
+    slide = 0.5 * k_r * gap * gap * fade / (s * hypot(nx, ny, nz, _TIE))
     return (
         pull * goal[0] + push * n_o[0] + slide * nx,
         pull * goal[1] + push * n_o[1] + slide * ny,

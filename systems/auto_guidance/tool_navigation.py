@@ -56,7 +56,7 @@ class ToolNavigationParams:
     """
 
     period: float = 1.0 / 60.0
-    tip_speed: float = 0.06
+    tip_speed: float = 0.1
     turning_speed: float = 1.0
     acceleration: float = 1.0
     min_insertion: float = 0.03

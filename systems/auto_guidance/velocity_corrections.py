@@ -18,7 +18,7 @@ field's task (the paper's static case).
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import exp
+from math import exp, sqrt
 from typing import Any
 
 from systems.auto_guidance.signals import (
@@ -46,6 +46,8 @@ TABLE_II = [
 ]
 """Rows: time until O crosses (TIMES); columns: distance to there (DISTANCES)."""
 
+_JUST_PASSED = 0.1  # s; since when a crossing that is over counts no more
+
 
 @dataclass
 class VelocityCorrectionsParams:
@@ -60,7 +62,7 @@ class VelocityCorrectionsParams:
         acceleration_time: Time constant with which O's acceleration is taken to
             die out, s.
         moving_speed: Speed of O's tip from which on corrections count in full,
-            m/s; in proportion below.
+            m/s; not at all below half of it.
         miss_distance: How near a miss must be to count, m.
     """
 
@@ -137,15 +139,19 @@ def crossing(
         there is a crossing); degree 0 if there is none.
     """
     none = (0.0, 0.0, 0.0)
-    speed = norm(v1)
-    if speed < 1e-9:
+    vx, vy, vz = v1
+    v_o = velocity(obstacle)
+    speed = sqrt(vx * vx + vy * vy + vz * vz)
+    moving = 2.0 * norm(v_o) / params.moving_speed - 1.0
+    if speed < 1e-9 or moving <= 0.0:
         return none
     g = fulcrum(obstacle)
     a = sub(obstacle[0:3], g)
     b = sub(predicted_tip(obstacle, params.horizon, params.acceleration_time), g)
     n = cross(a, b)
-    n2 = dot(n, n)
-    approach = dot(v1, n) / speed
+    nx, ny, nz = n
+    n2 = nx * nx + ny * ny + nz * nz
+    approach = (vx * nx + vy * ny + vz * nz) / speed
     # O does not sweep, or the way lies in the plane that it sweeps.
     if n2 < 1e-16 or approach * approach < 1e-6 * n2:
         return none
@@ -162,18 +168,17 @@ def crossing(
     miss = params.miss_distance
     remaining = norm(sub(guide[9:12], guide[0:3]))
     degree = min(
-        _ramp((distance + miss) / miss),
-        _ramp((remaining + miss - distance) / miss),
-        _ramp((norm(a) + miss - reach * norm(a)) / miss),
-        _ramp((time + 0.1) / 0.1),
-        _ramp(4.0 * (params.horizon - time) / params.horizon),
-        _ramp(norm(velocity(obstacle)) / params.moving_speed),
+        1.0,
+        moving,
+        distance / miss + 1.0,
+        (remaining - distance) / miss + 1.0,
+        (1.0 - reach) * norm(a) / miss + 1.0,
+        time / _JUST_PASSED + 1.0,
+        4.0 * (1.0 - time / params.horizon),
     )
+    if degree <= 0.0:
+        return none
     return max(distance, 0.0), max(time, 0.0), degree
-
-
-def _ramp(x: float) -> float:
-    return 0.0 if x < 0.0 else 1.0 if x > 1.0 else x
 
 
 class SpeedScale:

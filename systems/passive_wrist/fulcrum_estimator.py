@@ -114,5 +114,5 @@ class FulcrumEstimator(Block):
             z[tracker.at("refused")],
         ]
 
-    def _calc_covariance(self, context: Any) -> Sequence[float]:
+    def _calc_covariance(self, context: Any) -> Any:
         return self._tracker.covariance(self._posterior.Eval(context)).reshape(-1)

@@ -78,10 +78,22 @@ class FulcrumParams:
 
     def check(self) -> None:
         """Raises ValueError naming the first field that makes no sense."""
-        for name in (
-            "guess_sigma stiffness_sigma force_noise moment_noise learn_above "
-            "depth_above depth_speed length still_walk wall_walk amplitude_walk axial_ratio neighbourhood period"
-        ).split():
+        for name in [
+            "guess_sigma",
+            "stiffness_sigma",
+            "force_noise",
+            "moment_noise",
+            "learn_above",
+            "depth_above",
+            "depth_speed",
+            "length",
+            "still_walk",
+            "wall_walk",
+            "amplitude_walk",
+            "axial_ratio",
+            "neighbourhood",
+            "period",
+        ]:
             if not 0.0 < getattr(self, name) < float("inf"):
                 raise ValueError(
                     f"fulcrum estimator: {name}={getattr(self, name)} must be > 0"

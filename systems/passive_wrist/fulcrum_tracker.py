@@ -38,8 +38,8 @@ class FulcrumTracker:
     """The estimator over plain arrays; all it remembers is the vector `z`.
 
     Layout of z: x (n), P (n n), the record (120 x 13: mean p_WS, u, f, m and weight
-    of the angle of a tenth of a second), the sums for its next entry (13), the scalars `AUX` and each harmonic's
-    rms in m when the breathing was found.
+    of the angle of a tenth of a second), the sums for its next entry (13), the
+    scalars `AUX`, and each harmonic's rms in m when the breathing was found.
 
     Attributes:
         filter: Prediction and updates.

@@ -333,7 +333,7 @@ class ToolWrench(Block):
     def _oldest(self, context: Any) -> Sequence[float]:
         return context.get_discrete_state(self._late).value()[:7]
 
-    def _push(self, context: Any) -> Sequence[float]:
+    def _push(self, context: Any) -> Any:
         late = context.get_discrete_state(self._late).value()
         return np.concatenate([late[7:], self._calc_wrench(context)])
 

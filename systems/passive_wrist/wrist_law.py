@@ -94,7 +94,7 @@ class WristParams:
             if name in ("mode", "guess", "probe"):
                 continue
             zero_ok = name in ("horizon", "slowest", "sensor_timeout")
-            if not (value > 0.0 or zero_ok and value == 0.0):
+            if not (value > 0.0 or (zero_ok and value == 0.0)):
                 raise ValueError(f"passive wrist: {name}={value} must be > 0")
         if not 10.0 <= self.spring_stiffness <= 2e4:
             raise ValueError(

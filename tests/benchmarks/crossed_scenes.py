@@ -35,6 +35,7 @@ CONTACT = 0.005
 KINDS = ("standing", "moving")
 _WANDER_TIME = 7.0
 _ACCELERATION = 0.4
+_TRIES = 1000
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,17 @@ class Leg:
     def end(self) -> float:
         """Time of arrival, s."""
         return self.start + self._shape()[2]
+
+    def shortened(self, end: float) -> "Leg":
+        """The same way, only as far as brings it to rest at the time `end`."""
+        left = end - self.start
+        ramp = self.speed / _ACCELERATION
+        if left >= 2.0 * ramp:
+            way = self.speed * (left - ramp)
+        else:
+            way = _ACCELERATION * (0.5 * left) ** 2
+        d = sub(self.p1, self.p0)
+        return Leg(self.start, self.p0, along(self.p0, way / norm(d), d), self.speed)
 
     def at(self, time: float) -> tuple[Vector, Vector, Vector]:
         """Position, velocity and acceleration at `time`."""
@@ -163,7 +175,7 @@ def _draw(rng: np.random.Generator, moving: bool) -> Scene | None:
             return None
         return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
     legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
-    return Scene(g_r, start, goal, g_o, legs)
+    return Scene(g_r, start, goal, g_o, legs) if legs else None
 
 
 def _fulcrum(rng: np.random.Generator, dome: float) -> Vector:
@@ -193,23 +205,29 @@ def _wander(
     goal: Vector,
     from_g_r: float,
 ) -> list[Leg]:
-    """Legs between random points for 7 s, the last one to a place out of the way."""
+    """Legs between random points for 7 s, the last one to a place out of the way.
+
+    Empty if none is found: O may stand where every way leads too close to G_R.
+    """
     speed = float(rng.uniform(0.01, 0.06))
     legs: list[Leg] = []
     time = 0.0
-    while True:
+    for _ in range(_TRIES):
         p0 = legs[-1].p1 if legs else tip
         leg = Leg(time, p0, _tip(rng, dome, g_o), speed)
+        last = leg.end >= _WANDER_TIME
+        if last:
+            leg = leg.shortened(_WANDER_TIME)
         if any(
             closest_on_segment(g_r, g_o, along(p0, k / 20, sub(leg.p1, p0)))[1]
             < from_g_r
             for k in range(21)
         ):
             continue
-        last = leg.end >= _WANDER_TIME
         if last and closest_points(g_r, goal, g_o, leg.p1)[2] < CONTACT + 0.003:
             continue
         legs.append(leg)
         time = leg.end
         if last:
             return legs
+    return []

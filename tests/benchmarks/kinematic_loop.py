@@ -13,7 +13,6 @@ from typing import Protocol
 from systems.auto_guidance.backward_movement import (
     BackwardMovementParams,
     backward_movement,
-    contact_velocity,
 )
 from systems.auto_guidance.fuzzy_arbiter import (
     Decision,
@@ -112,8 +111,7 @@ class LocalPlanner:
         self.v2 = velocity_correction(
             self.corrections, self._scale, self.v1, self.guide, obstacle
         )
-        v_o = contact_velocity(self.guide, obstacle)
-        self.v3 = backward_movement(self.backward, self.v3, dt, v_o)
+        self.v3 = backward_movement(self.backward, self.v3, dt, self.guide, obstacle)
         self.weights, self._v_tip, _ = arbitrate(
             self.arbiter,
             self._decision,
@@ -180,12 +178,14 @@ class Outcome:
             contact was made.
         contact: The tools touched.
         clearance: Least distance of the surfaces, m; what it was at contact.
+        fraction: l/L on O where the clearance was least.
         time: Of the first arrival within 1 mm, s; None without one.
     """
 
     reached: bool
     contact: bool
     clearance: float
+    fraction: float
     time: float | None
 
 
@@ -209,7 +209,7 @@ def run(
     """
     robot = robot or Robot()
     tip = scene.p_WPr
-    clearance = float("inf")
+    clearance, fraction = float("inf"), 1.0
     arrival: float | None = None
     target = estimate(scene.p_WPs, scene.p_WPs)
     substeps = 4
@@ -228,13 +228,14 @@ def run(
         for i in range(substeps):
             tip = robot.moved(scene.p_WGr, tip, v_tip, dt)
             p = scene.obstacle_tip(time + (i + 1) * dt)[0]
-            axes = closest_points(scene.p_WGr, tip, scene.p_WGo, p)[2]
-            clearance = min(clearance, axes - CONTACT)
+            _, l_share, axes, _, _ = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
+            if axes - CONTACT < clearance:
+                clearance, fraction = axes - CONTACT, l_share
         if clearance <= 0.0:
-            return Outcome(False, True, clearance, None)
+            return Outcome(False, True, clearance, fraction, arrival)
         near = norm(sub(tip, scene.p_WPs)) < 1e-3
         if near and arrival is None:
             arrival = time + PLANNER_PERIOD
         if near and norm(v_tip) < 2e-3 and time > scene.rest_time:
-            return Outcome(True, False, clearance, arrival)
-    return Outcome(False, False, clearance, arrival)
+            return Outcome(True, False, clearance, fraction, arrival)
+    return Outcome(False, False, clearance, fraction, arrival)

@@ -12,8 +12,8 @@ from math import exp, pi, sqrt
 import numpy as np
 
 from systems.passive_wrist.fulcrum_filter import FulcrumParams, Sample
-from systems.passive_wrist.fulcrum_tracker import BREATHING, FulcrumTracker
-from systems.passive_wrist.wall_model import dot, lateral_basis
+from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
+from systems.passive_wrist.wall_model import dot
 from systems.passive_wrist.wrist_law import WristInput, WristLaw, WristParams
 
 LENGTH, INSIDE = 0.40, 0.18
@@ -172,7 +172,6 @@ def run(case: Case) -> dict[str, np.ndarray]:
         else:
             ahead = estimator.ahead(z, case.wrist.horizon)
         C = estimator.covariance(z)
-        e1, e2 = lateral_basis(ul)
         along = float(u @ C @ u)
         across = (float(np.trace(C)) - along) / 2
         p_WP, v_WP = tip(t)
@@ -226,9 +225,10 @@ def run(case: Case) -> dict[str, np.ndarray]:
         e, de = (e + (de + w * e) * dt) * decay, (de - (de + w * e) * w * dt) * decay
         x, dx = goal + dgoal * dt + e, dgoal + de
     names = (
-        "t force offset ex ey ez lateral across along K nees rate frozen probe "
-        "jumps nis phase refused depth"
-    ).split()
+        *("t", "force", "offset", "ex", "ey", "ez", "lateral", "across", "along"),
+        *("K", "nees", "rate", "frozen", "probe", "jumps", "nis", "phase"),
+        *("refused", "depth"),
+    )
     a = np.array(rows)
     out = {k: a[:, i] for i, k in enumerate(names)}
     out["error"] = np.linalg.norm(a[:, 3:6], axis=1)

@@ -86,9 +86,3 @@ def rms(values: np.ndarray) -> float:
 def last_above(time: np.ndarray, value: np.ndarray, bound: float) -> float | None:
     """When a value falls below a bound to stay; None if it never does."""
     return settled(np.append(0.0, time), np.append(bound, value), bound)
-
-
-def measure(run: Any) -> dict[str, Any]:
-    """The figures of a run of the wrist study."""
-    scenario = run.scenario
-    return wrist_figures(run, scenario.measure_from, scenario.event)

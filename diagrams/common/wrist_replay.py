@@ -26,9 +26,7 @@ def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
     time = run.signals["time"]
     true = run.matrix("wall.fulcrum")[:, :3]
     believed = run.matrix("wrist.pivot")
-    draw_point(
-        meshcat, animation, "true_fulcrum", time, true, (0.16, 0.62, 0.3, 0.9)
-    )
+    draw_point(meshcat, animation, "true_fulcrum", time, true, (0.16, 0.62, 0.3, 0.9))
     draw_point(
         meshcat, animation, "believed_fulcrum", time, believed, (0.55, 0.2, 0.75, 0.9)
     )
@@ -42,8 +40,3 @@ def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
         (0.95, 0.6, 0.1, 1.0),
         step=4,
     )
-
-
-def decorate(meshcat: Any, animation: Any, run: Any) -> None:
-    """Decoration of the wrist study."""
-    decorate_wrist(meshcat, animation, run)

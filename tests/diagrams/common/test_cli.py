@@ -1,0 +1,142 @@
+"""Tests of the command line: what it writes, prints and refuses."""
+
+import json
+from pathlib import Path
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from diagrams.common.cli import main
+from diagrams.common.scenario import scenario_files
+
+SHORT = ["--duration", "0.2", "--no-replay"]
+
+
+def run(*arguments: str) -> int:
+    """Runs the command line in this process."""
+    return main([*arguments])
+
+
+def test_scenarios_lists_every_name_with_its_line(capsys):
+    assert run("scenarios") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(scenario_files())
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_a_run_writes_everything_and_repeats_itself(tmp_path, capsys):
+    out = tmp_path / "first"
+    code = run("run", "gauze_static", "--out", str(out), "--seed", "3", *SHORT)
+    assert code == 0
+    assert "min_tool_clearance" in capsys.readouterr().out
+    names = {path.name for path in out.iterdir()}
+    assert {"metrics.json", "signals.csv", "scenario.yaml"} <= names
+    assert sum(name.endswith(".png") for name in names) == 4
+    log = np.genfromtxt(out / "signals.csv", delimiter=",", names=True)
+    assert log["time"][-1] == pytest.approx(0.2)
+    again = tmp_path / "second"
+    code = run("run", str(out / "scenario.yaml"), "--out", str(again), "--no-replay")
+    assert code == 0
+    assert (again / "signals.csv").read_text() == (out / "signals.csv").read_text()
+    other = tmp_path / "other"
+    code = run("run", "gauze_static", "--out", str(other), "--seed", "4", *SHORT)
+    assert (other / "signals.csv").read_text() != (out / "signals.csv").read_text()
+
+
+def test_set_changes_what_runs(tmp_path):
+    code = run(
+        *("run", "gauze_static", "--out", str(tmp_path), *SHORT),
+        *("--set", "abdomen.stiffness=800", "--set", "robot.p_WP=[-0.04, 0.0, -0.1]"),
+    )
+    assert code == 0
+    assert "stiffness: 800" in (tmp_path / "scenario.yaml").read_text()
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert metrics["reached"] is False
+    assert metrics["time_to_target"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "gauze_statik"], "did you mean 'gauze_static'"),
+        (["run", "gauze_static", "--set", "abdomen.stifness=1"], "'stiffness'"),
+        (["run", "gauze_static", "--set", "abdomen.stiffness=-5"], "stiffness=-5"),
+        (["run", "gauze_static", "--set", "robot.p_WP=[0, 0]"], "expected 3 numbers"),
+        (["run", "gauze_static", "--set", "robot.p_WP=[0,0,.nan]"], "finite"),
+        (
+            ["run", "gauze_static", "--set", "obstacle.p_WG=[0.0, 0.001, 0.0]"],
+            "expected at least 0.02 m",
+        ),
+        (
+            ["run", "gauze_static", "--set", "target.points=[[0.1, 0.0, -0.4]]"],
+            "out of reach",
+        ),
+        (
+            ["run", "gauze_static", "--set", "camera.p_WS=[-0.06, -0.06, -0.1]"],
+            "outside the view cone",
+        ),
+        (["run", "gauze_static", "--set", "recording=nowhere.csv"], "nowhere.csv"),
+        (["run", "gauze_static", "--set", "duration=0"], "duration=0"),
+        (["run", "gauze_static", "--set", "go_to_target.form=exact"], "corrected"),
+        (["run", "gauze_static", "--set", "seed=1.5"], "whole number"),
+        (["diagram", "gauze_static", "--out", "picture.bmp"], ".svg or .png"),
+    ],
+)
+def test_bad_input_gets_one_clear_line(arguments, message, capsys, tmp_path):
+    if arguments[0] == "run":
+        arguments = [*arguments, "--out", str(tmp_path / "out"), "--no-replay"]
+    assert run(*arguments) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("trocar: error: ")
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_an_output_folder_that_cannot_be_written(tmp_path, capsys):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    assert run("run", "gauze_static", "--out", str(blocked / "out"), *SHORT) == 2
+    assert "cannot write to the output folder" in capsys.readouterr().err
+
+
+def test_diagram_is_drawn(tmp_path):
+    picture = tmp_path / "diagram.svg"
+    assert run("diagram", "gauze_static", "--out", str(picture)) == 0
+    text = picture.read_text()
+    for block in ("go_to_target", "fuzzy_arbiter", "joint_commands", "plant"):
+        assert block in text
+
+
+def test_the_module_is_the_command_line_and_teaches():
+    done = subprocess.run(
+        [sys.executable, "-m", "diagrams", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    )
+    assert "trocar run gauze_dynamic" in done.stdout
+
+
+def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
+    from diagrams.common.run import run_scenario
+    from diagrams.common.scenario import load_scenario
+    from systems.auto_guidance.endoscope import Endoscope
+
+    follow = Endoscope._follow
+
+    def broken(self, context):
+        if context.get_time() > 0.3:
+            raise RuntimeError("the camera fell off")
+        return follow(self, context)
+
+    monkeypatch.setattr(Endoscope, "_follow", broken)
+    scenario = load_scenario("gauze_static", duration=1.0)
+    run = run_scenario(scenario, tmp_path, with_replay=False)
+    assert "the camera fell off" in run.error
+    log = np.genfromtxt(tmp_path / "signals.csv", delimiter=",", names=True)
+    assert 0.2 < log["time"][-1] < 0.4
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert "the camera fell off" in metrics["error"]

@@ -1,0 +1,63 @@
+"""Clearances against an independent distance of segments."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from plants.instruments.clearance import Clearance
+from plants.instruments.instrument import InstrumentParams
+from plants.instruments.posed_tools import PosedToolsParams
+
+ROBOT, TOOLS = InstrumentParams(), PosedToolsParams()
+
+
+def core(tip, u, length, radius):
+    """Ends of a capsule's inner segment: tip and length are of its surface."""
+    tip, u = np.asarray(tip), np.asarray(u) / np.linalg.norm(u)
+    return tip - radius * u, tip - (length - radius) * u
+
+
+def segment_distance(a, b):
+    """Least distance of two segments, by brute force over their proportions."""
+
+    def distance(x):
+        p = a[0] + x[0] * (a[1] - a[0])
+        q = b[0] + x[1] * (b[1] - b[0])
+        return np.sum((p - q) ** 2) * 1e4
+
+    starts = [(s, t) for s in (0.1, 0.5, 0.9) for t in (0.1, 0.5, 0.9)]
+    best = min(
+        minimize(distance, x, bounds=[(0, 1), (0, 1)], tol=1e-14).fun for x in starts
+    )
+    return np.sqrt(best / 1e4)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_clearance_is_the_distance_of_the_shafts_surfaces(make_scene, seed):
+    rng = np.random.default_rng(seed)
+    shafts = {}
+    for name in "SOC":
+        fulcrum = np.array([*rng.uniform(0.03, 0.1, 2) * rng.choice([-1, 1], 2), 0.0])
+        tip = np.array([*rng.uniform(-0.05, 0.05, 2), -rng.uniform(0.05, 0.15)])
+        u = (tip - fulcrum) / np.linalg.norm(tip - fulcrum)
+        shafts[name] = [*tip, *u]
+    p_WP = np.array([0.03, -0.02, -0.13])
+    scene = make_scene(p_WP=p_WP, tool_shafts=shafts)
+    measured = scene.output(scene.clearance, "clearance")
+
+    r = 0.5 * ROBOT.diameter
+    robot = core(p_WP, p_WP, ROBOT.length - ROBOT.mount_length, r)
+    for value, name in zip(measured, "OSC", strict=True):
+        scope = name == "C"
+        radius = 0.5 * (TOOLS.endoscope_diameter if scope else TOOLS.tool_diameter)
+        length = TOOLS.endoscope_length if scope else TOOLS.tool_length
+        other = core(shafts[name][:3], shafts[name][3:], length, radius)
+        expected = segment_distance(robot, other) - r - radius
+        assert value == pytest.approx(expected, abs=2e-5)
+
+
+def test_missing_geometry_is_refused():
+    with pytest.raises(ValueError, match=r"no geometry of \['C'\]"):
+        Clearance(object(), {"O": 1, "S": 2})
+    with pytest.raises(ValueError, match="no geometry of the robot"):
+        Clearance(None, {"O": 1, "S": 2, "C": 3})
