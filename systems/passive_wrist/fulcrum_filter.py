@@ -1,6 +1,6 @@
 """The Kalman filter behind the fulcrum estimator: prediction and updates.
 
-State x, n = 8 + 6 H: mean position c (3, random walk), per harmonic k of the
+State x, n = 5 + 6 H: mean position c (3, random walk), per harmonic k of the
 breathing a cosine and a sine part a_k, b_k (3 each), ln omega, ln K. The fulcrum
 is I = c + sum_k a_k, its velocity -sum_k k omega b_k, and a look ahead by T turns
 every (a_k, b_k) by k omega T. The measurement is `wall_model`'s, linearised.
@@ -187,11 +187,27 @@ class FulcrumFilter:
     def __init__(self, params: FulcrumParams) -> None:
         params.check()
         self.p = params
-        self.n = 8 + 6 * params.harmonics
+        self.n = 5 + 6 * params.harmonics
+        self._identity = np.eye(self.n)
         self.total = np.zeros((3, self.n))
         self.parts = [6 * k + 3 for k in range(params.harmonics)]
         for i in (0, *self.parts):
             self.total[:, i : i + 3] = np.eye(3)
+        self._index_turns()
+
+    def _index_turns(self) -> None:
+        """Where the turning of each harmonic stands in the transition matrix."""
+        n = self.n
+        places, turns, partners, slopes = [], [], [], []
+        for k, i in enumerate(self.parts):
+            for j in (0, 1, 2):
+                a, b = i + j, i + 3 + j
+                places += [a * (n + 1), b * (n + 1), a * n + b, b * n + a]
+                turns += [3 * k, 3 * k, 3 * k + 1, 3 * k + 2]
+            partners += [*range(i + 3, i + 6), *range(i, i + 3)]
+            slopes += [-(k + 1.0)] * 3 + [k + 1.0] * 3
+        self._turned, self._turn = np.array(places), np.array(turns)
+        self._partner, self._slope = np.array(partners), np.array(slopes)
 
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
         """State and covariance before the first sample, no breathing."""
@@ -271,20 +287,16 @@ class FulcrumFilter:
         n = self.n
         diagonal = P.reshape(-1)[:: n + 1]
         if part_walks:
-            F = np.eye(n)
-            flat = F.reshape(-1)
-            step = n + 1
+            F = self._identity.copy()
             theta = exp(x[n - 2]) * dt
-            for k, i in enumerate(self.parts, 1):
+            turns = []
+            for k in range(1, len(part_walks) + 1):
                 c, s = cos(k * theta), sin(k * theta)
-                flat[i * step : (i + 6) * step : step] = c
-                flat[i * step + 3 : (i + 3) * step : step] = -s
-                flat[(i + 3) * step - 3 : (i + 6) * step - 3 : step] = s
+                turns += [c, -s, s]
+            F.reshape(-1)[self._turned] = np.array(turns)[self._turn]
             x[:] = F.dot(x)
-            for k, i in enumerate(self.parts, 1):
-                F[i : i + 3, n - 2] = -k * theta * x[i + 3 : i + 6]
-                F[i + 3 : i + 6, n - 2] = k * theta * x[i : i + 3]
-            P[:] = F.dot(P).dot(F.T)
+            F[3 : n - 2, n - 2] = theta * self._slope * x[self._partner]
+            np.dot(F.dot(P), F.T, out=P)
             for i, part in zip(self.parts, part_walks, strict=True):
                 diagonal[i : i + 6] += part**2 * dt
             diagonal[n - 2] += 1e-4 * dt
@@ -350,12 +362,10 @@ class FulcrumFilter:
             along = u.dot(blocks)
             blocks -= ((1.0 - i.axial) * u)[:, None] * along[:, None, :]
         x += gain.dot(i.y)
-        cross = gain.dot(i.HP)
-        P += gain.dot(i.S).dot(gain.T)
-        P -= cross
-        P -= cross.T
-        P += P.T.copy()  # rounding must not grow a skew part
-        P *= 0.5
+        # P + K S K^T - K H P - (K H P)^T, so written that rounding grows no skew.
+        half = gain.dot(0.5 * i.S.dot(gain.T) - i.HP)
+        half += 0.5 * P
+        np.add(half, half.T, out=P)
 
     def jump(self, x: np.ndarray, P: np.ndarray, a: Sample, size: float) -> None:
         """The wall has jumped by about `size` m: fits the mean alone, iterated."""

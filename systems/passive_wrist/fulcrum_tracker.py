@@ -16,12 +16,13 @@ Three decisions keep it consistent where a plain extended Kalman filter is not:
   over, the second opens the mean's covariance, and only the mean is updated.
 """
 
-from math import exp, hypot, log, pi, sqrt
+from math import dist, exp, hypot, log, pi, sqrt
 
 import numpy as np
 
 from systems.passive_wrist.breathing_rate import BreathingFit, find_breathing
 from systems.passive_wrist.fulcrum_filter import FulcrumFilter, FulcrumParams, Sample
+from systems.passive_wrist.wall_model import dot
 
 BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0  # phases
 _RECORD = 120  # entries of the record
@@ -98,7 +99,7 @@ class FulcrumTracker:
         n, total = self.filter.n, self.filter.total
         P = total @ z[n : self._record].reshape(n, n) @ total.T
         bias = self.p.force_bias * 0.5 / exp(z[n - 1])
-        P[(0, 1, 2), (0, 1, 2)] += bias**2
+        P.reshape(-1)[::4] += bias**2
         return P
 
     def stiffness(self, z: np.ndarray) -> tuple[float, float]:
@@ -150,8 +151,9 @@ class FulcrumTracker:
             aux[4] += 0.02 * (min(nis, 60.0) / 4.0 - aux[4])
             f.update(x, P, i, 3 if guard else n if force > p.learn_above else n - 1)
         self._remember(z, sample, i.w)
-        far = f.total.dot(x) - p.guess
-        if float(far.dot(far)) > p.neighbourhood**2:  # refused: starts anew
+        if (
+            dist(f.total.dot(x).tolist(), p.guess) > p.neighbourhood
+        ):  # refused: starts anew
             aux[9] += 1.0
             aux[0], aux[3], aux[5], aux[6] = FOLLOWING, 0.0, 0.0, 0.0
             x[:3], x[3 : n - 2] = p.guess, 0.0
@@ -183,17 +185,20 @@ class FulcrumTracker:
         """Adds a sample to the record and looks for the breathing in it."""
         sums = z[self._sums : self._aux]
         # The damping's part is taken out now: later the velocities are gone.
-        d1 = a.damping * sum(w[k] * a.e1[k] for k in (0, 1, 2))
-        d2 = a.damping * sum(w[k] * a.e2[k] for k in (0, 1, 2))
+        d1, d2 = a.damping * dot(w, a.e1), a.damping * dot(w, a.e2)
         f1, f2 = a.z[0] - d1, a.z[1] - d2
-        depth = sum(a.u[k] * (z[k] - a.p_WS[k]) for k in (0, 1, 2))
+        depth = dot(a.u, z[:3].tolist()) - dot(a.u, a.p_WS)
         m1, m2 = a.z[2] + depth * d2, a.z[3] - depth * d1
         e1, e2 = a.e1, a.e2
         sums += [
             *a.p_WS,
             *a.u,
-            *(f1 * e1[k] + f2 * e2[k] for k in (0, 1, 2)),
-            *(m1 * e1[k] + m2 * e2[k] for k in (0, 1, 2)),
+            f1 * e1[0] + f2 * e2[0],
+            f1 * e1[1] + f2 * e2[1],
+            f1 * e1[2] + f2 * e2[2],
+            m1 * e1[0] + m2 * e2[0],
+            m1 * e1[1] + m2 * e2[1],
+            m1 * e1[2] + m2 * e2[2],
             a.turning,
         ]
         aux = z[self._aux : self._parts]

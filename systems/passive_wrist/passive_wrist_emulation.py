@@ -19,7 +19,13 @@ from math import isfinite
 from typing import Any
 
 from systems.common.block import Block
-from systems.passive_wrist.wrist_law import WristInput, WristLaw, WristParams
+from systems.passive_wrist.wrist_law import (
+    FROZEN,
+    SCALE,
+    WristInput,
+    WristLaw,
+    WristParams,
+)
 
 __all__ = ["PassiveWristEmulation", "WristParams"]
 
@@ -141,11 +147,11 @@ class PassiveWristEmulation(Block):
         return [*self._law.pose(state, v_WP), state[-1]]
 
     def _calc_permission(self, context: Any) -> Sequence[float]:
-        state, at = self._next.Eval(context), WristLaw.at
-        frozen = state[at("frozen")]
+        state = self._next.Eval(context)
+        frozen = state[FROZEN]
         if frozen:
             return [0.0, LOADED if frozen == 1.0 else SENSOR_LOST]
-        scale = state[at("scale")]
+        scale = state[SCALE]
         return [scale, FREE if scale > 0.0 else PROBING]
 
     def _calc_pivot(self, context: Any) -> Sequence[float]:

@@ -18,12 +18,25 @@ Around it lie three guards, all kept in one small state vector:
 """
 
 from dataclasses import dataclass
-from math import exp, hypot, pi, sqrt
+from math import dist, exp, hypot, pi, sqrt
 
 from systems.passive_wrist.wall_model import Vector, dot, lateral_basis
 
 MODES = ("pwe", "spring", "off", "known")
 PROBE_OFF, PROBE_ON, PROBE_BACK = 0.0, 1.0, 2.0
+STARTED = 12  # 1 once the law has begun
+FROZEN = 13  # 1 for force, 2 for a lost sensor
+OVER = 14  # s over the force limit
+CALM = 15  # s under the release force with a live sensor
+SILENT = 16  # s without a live sensor
+PROBE = 17  # PROBE_OFF before, then PROBE_ON, PROBE_BACK
+OFFSET = 18  # of the probe, in m
+WAY = 19  # +1 or -1
+DWELL = 20  # s at the present end of the probe
+PROBED = 21  # s of probing
+DONE = 22  # 1 once the probe is over
+FREEZES = 23  # so far
+SCALE = 24  # share of the task's speed
 
 
 @dataclass
@@ -144,25 +157,10 @@ class WristLaw:
     """The law; everything it remembers is a list of `size` floats.
 
     Layout: pivot (3), its velocity (3), commanded tip (3), filtered spring
-    offset (3), and the scalars of `SCALARS`.
+    offset (3), and the scalars whose places are named above.
     """
 
-    SCALARS = (
-        "started",
-        "frozen",  # 1 force, 2 sensor
-        "over",  # s over the force limit
-        "calm",  # s under the release force with a live sensor
-        "silent",  # s without a live sensor
-        "probe",  # PROBE_OFF before and after, PROBE_ON, PROBE_BACK
-        "offset",  # of the probe, in m
-        "way",  # +1 or -1
-        "dwell",  # s at the present end of the probe
-        "probed",  # s of probing
-        "done",  # 1 once the probe is over
-        "freezes",  # so far
-        "scale",  # speed scale
-    )
-    size = 12 + len(SCALARS)
+    size = 25
 
     def __init__(self, params: WristParams) -> None:
         params.check()
@@ -171,33 +169,26 @@ class WristLaw:
     def initial(self) -> list[float]:
         """The state before the first update."""
         state = [0.0] * self.size
-        state[self.at("way")] = 1.0
+        state[WAY] = 1.0
         return state
-
-    @classmethod
-    def at(cls, name: str) -> int:
-        """Index of a scalar in the state."""
-        return 12 + cls.SCALARS.index(name)
 
     def step(self, state: list[float], i: WristInput) -> list[float]:
         """The next state."""
         s = list(state)
         p = self.p
-        at = self.at
         dt = p.period
         force = sqrt(max(dot(i.f, i.f) - dot(i.f, i.u) ** 2, 0.0))
         self._watch(s, force, i.valid)
         target, velocity = self._pivot(s, i)
         if p.mode == "pwe" and p.probe:
             target, velocity = self._probe(s, i, target, velocity)
-        if s[at("started")] == 0.0:
+        if s[STARTED] == 0.0:
             s[0:3], s[3:6] = target, velocity
             s[6:9] = i.p_WP
-            s[at("started")] = 1.0
-        reach = sqrt(sum((i.p_WP[k] - s[k]) ** 2 for k in (0, 1, 2)))
-        length = sqrt(sum((i.p_WP[k] - i.p_WS[k]) ** 2 for k in (0, 1, 2)))
+            s[STARTED] = 1.0
+        reach, length = dist(i.p_WP, s[0:3]), dist(i.p_WP, i.p_WS)
         self._move_pivot(s, target, velocity, max(reach / max(length, 1e-3), 0.1))
-        if s[at("frozen")] == 0.0:
+        if s[FROZEN] == 0.0:
             # The tip goes back to its task no faster than the wrist may move.
             away = [i.p_WP[k] - s[6 + k] for k in (0, 1, 2)]
             far = sqrt(dot(away, away))
@@ -205,13 +196,13 @@ class WristLaw:
             share = 1.0 if far <= step else step / far
             for k in (0, 1, 2):
                 s[6 + k] += share * away[k]
-        s[at("scale")] = self._scale(s, i)
+        s[SCALE] = self._scale(s, i)
         return s
 
     def pose(self, state: list[float], v_WP: Vector) -> list[float]:
         """Desired instrument: p_WP, u_W, v_WP, du_W (12)."""
         pivot, dpivot, tip = state[0:3], state[3:6], state[6:9]
-        frozen = state[self.at("frozen")] != 0.0
+        frozen = state[FROZEN] != 0.0
         v = [0.0, 0.0, 0.0] if frozen else list(v_WP)
         away = [tip[k] - pivot[k] for k in (0, 1, 2)]
         reach = sqrt(dot(away, away))
@@ -275,62 +266,62 @@ class WristLaw:
         self, s: list[float], i: WristInput, target: list[float], velocity: list[float]
     ) -> tuple[list[float], list[float]]:
         """Adds the probing move to the pivot's target."""
-        p, at = self.p, self.at
+        p = self.p
         dt = p.period
-        if s[at("done")] == 1.0 or not i.valid:
+        if s[DONE] == 1.0 or not i.valid:
             return target, velocity
         known = i.stiffness_sigma < 0.15 and i.sigma_along < 1.5e-3
-        if s[at("probe")] == PROBE_OFF:
-            s[at("probe")] = PROBE_ON if i.stiffness_sigma > 0.3 else PROBE_BACK
-        s[at("probed")] += dt
-        if known or s[at("probed")] > p.probe_time:
-            s[at("probe")] = PROBE_BACK
+        if s[PROBE] == PROBE_OFF:
+            s[PROBE] = PROBE_ON if i.stiffness_sigma > 0.3 else PROBE_BACK
+        s[PROBED] += dt
+        if known or s[PROBED] > p.probe_time:
+            s[PROBE] = PROBE_BACK
         e = lateral_basis(i.u)[0]
         speed = min(p.probe_speed, p.probe_force_rate / i.stiffness)
-        offset, way = s[at("offset")], s[at("way")]
+        offset, way = s[OFFSET], s[WAY]
         move = 0.0
-        if s[at("probe")] == PROBE_BACK:
+        if s[PROBE] == PROBE_BACK:
             move = max(-speed * dt, min(speed * dt, -offset))
             if offset + move == 0.0:
-                s[at("done")] = 1.0
+                s[DONE] = 1.0
         elif -dot(i.f, e) * way >= p.probe_force or offset * way >= p.probe_travel:
-            s[at("dwell")] += dt
-            if s[at("dwell")] > 0.1:
-                s[at("way")], s[at("dwell")] = -way, 0.0
+            s[DWELL] += dt
+            if s[DWELL] > 0.1:
+                s[WAY], s[DWELL] = -way, 0.0
         else:
             move = way * speed * dt
-        s[at("offset")] = offset + move
+        s[OFFSET] = offset + move
         for k in (0, 1, 2):
-            target[k] += s[at("offset")] * e[k]
+            target[k] += s[OFFSET] * e[k]
             velocity[k] += move / dt * e[k]
         return target, velocity
 
     def _watch(self, s: list[float], force: float, valid: bool) -> None:
         """Freezes and releases the task."""
-        p, at = self.p, self.at
+        p = self.p
         dt = p.period
-        s[at("over")] = s[at("over")] + dt if valid and force > p.force_limit else 0.0
-        s[at("silent")] = 0.0 if valid else s[at("silent")] + dt
+        s[OVER] = s[OVER] + dt if valid and force > p.force_limit else 0.0
+        s[SILENT] = 0.0 if valid else s[SILENT] + dt
         calm = valid and force < p.release_force
-        s[at("calm")] = s[at("calm")] + dt if calm else 0.0
-        if s[at("frozen")] != 0.0:
-            if s[at("calm")] >= p.release_time:
-                s[at("frozen")] = 0.0
-        elif s[at("over")] >= p.force_limit_time:
-            s[at("frozen")] = 1.0
-            s[at("freezes")] += 1.0
-        elif s[at("silent")] > p.sensor_timeout:
-            s[at("frozen")] = 2.0
-            s[at("freezes")] += 1.0
+        s[CALM] = s[CALM] + dt if calm else 0.0
+        if s[FROZEN] != 0.0:
+            if s[CALM] >= p.release_time:
+                s[FROZEN] = 0.0
+        elif s[OVER] >= p.force_limit_time:
+            s[FROZEN] = 1.0
+            s[FREEZES] += 1.0
+        elif s[SILENT] > p.sensor_timeout:
+            s[FROZEN] = 2.0
+            s[FREEZES] += 1.0
 
     def _scale(self, s: list[float], i: WristInput) -> float:
         """Share of the task's speed that is safe now."""
-        p, at = self.p, self.at
-        if s[at("frozen")] != 0.0:
+        p = self.p
+        if s[FROZEN] != 0.0:
             return 0.0
         if p.mode != "pwe":
             return 1.0
-        if s[at("probe")] != PROBE_OFF and s[at("done")] == 0.0:
+        if s[PROBE] != PROBE_OFF and s[DONE] == 0.0:
             return 0.0
         doubt = hypot(i.sigma_across / p.sure_across, i.sigma_along / p.sure_along)
         return 1.0 if doubt <= 1.0 else max(p.slowest, 1.0 / doubt)

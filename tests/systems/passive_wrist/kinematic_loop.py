@@ -14,7 +14,14 @@ import numpy as np
 from systems.passive_wrist.fulcrum_filter import FulcrumParams, Sample
 from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
 from systems.passive_wrist.wall_model import dot
-from systems.passive_wrist.wrist_law import WristInput, WristLaw, WristParams
+from systems.passive_wrist.wrist_law import (
+    DONE,
+    FROZEN,
+    PROBE,
+    WristInput,
+    WristLaw,
+    WristParams,
+)
 
 LENGTH, INSIDE = 0.40, 0.18
 
@@ -210,8 +217,8 @@ def run(case: Case) -> dict[str, np.ndarray]:
                 stiffness,
                 float(error @ np.linalg.solve(C, error)),
                 estimator.breathing(z),
-                state[law.at("frozen")],
-                state[law.at("probe")] * (1 - state[law.at("done")]),
+                state[FROZEN],
+                state[PROBE] * (1 - state[DONE]),
                 z[estimator.at("jumps")],
                 z[estimator.at("nis")],
                 z[estimator.at("phase")],
