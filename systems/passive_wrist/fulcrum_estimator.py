@@ -49,9 +49,8 @@ class FulcrumEstimator(Block):
             "shaft", [0.0, 0.0, 0.22, 0.0, 0.0, -1.0, *[0.0] * 6]
         )
         self._wrench = self.vector_in("wrench", [0.1, 0.0, 0.0, 0.0, 0.02, 0.0, 1.0])
-        # State: the tracker's, and the time of its last update.
-        initial = np.append(self._tracker.initial(), -self._p.period)
-        self._state = self.DeclareDiscreteState(initial)
+        self._state = self.DeclareDiscreteState(self._tracker.initial())
+        self._time = self._tracker.at("time")
         read = {
             self.xd_ticket(),
             self.time_ticket(),
@@ -69,9 +68,8 @@ class FulcrumEstimator(Block):
         """The state with this instant's reading, once and only once."""
         state = context.get_discrete_state(self._state).value()
         time = context.get_time()
-        if time - state[-1] < 0.5 * self._p.period:
+        if time - state[self._time] < 0.5 * self._p.period:
             return state.copy()
-        z = state[:-1]
         w = self._wrench.Eval(context).tolist()
         s = self._shaft.Eval(context).tolist()
         if w[6] > 0.5 and isfinite(sum(w)) and isfinite(sum(s)):
@@ -81,13 +79,14 @@ class FulcrumEstimator(Block):
             sample = Sample(
                 s[0:3], u, v, du, w[0:3], w[3:6], self._p.damping, turning=turning
             )
-            z = self._tracker.step(z, sample)
+            z = self._tracker.step(state, sample)
         else:
-            z = self._tracker.coast(z)
-        return np.append(z, time)
+            z = self._tracker.coast(state)
+        z[self._time] = time
+        return z
 
     def _ahead(self, context: Any, z: np.ndarray) -> tuple[list[float], list[float]]:
-        return self._tracker.ahead(z, max(0.0, context.get_time() - z[-1]))
+        return self._tracker.ahead(z, max(0.0, context.get_time() - z[self._time]))
 
     def _calc_fulcrum(self, context: Any) -> Sequence[float]:
         return self._ahead(context, self._posterior.Eval(context))[0]
@@ -96,10 +95,11 @@ class FulcrumEstimator(Block):
         z = self._posterior.Eval(context)
         tracker = self._tracker
         p, v = self._ahead(context, z)
-        C = tracker.covariance(z)
-        u = self._shaft.Eval(context)[3:6]
-        along = float(u.dot(C).dot(u))
-        across = 0.5 * (float(C[0, 0] + C[1, 1] + C[2, 2]) - along)
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = tracker.covariance(z).tolist()
+        x, y, s = self._shaft.Eval(context)[3:6].tolist()
+        along = x * x * xx + y * y * yy + s * s * zz
+        along += 2.0 * (x * y * xy + x * s * xz + y * s * yz)
+        across = 0.5 * (xx + yy + zz - along)
         stiffness, sigma = tracker.stiffness(z)
         return [
             *p,

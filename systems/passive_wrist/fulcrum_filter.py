@@ -17,7 +17,6 @@ from systems.passive_wrist.wall_model import (
     dot,
     lateral_basis,
     lateral_jacobian,
-    lateral_wrench,
 )
 
 
@@ -318,27 +317,24 @@ class FulcrumFilter:
                 w[j] -= rate * xs[i + 3 + j]
         depth = dot(u, r)
         w = [w[0] - depth * du[0], w[1] - depth * du[1], w[2] - depth * du[2]]
-        f1, f2, m1, m2, _ = lateral_wrench(r, w, u, a.e1, a.e2, stiffness, a.damping)
-        k1, k2 = stiffness * dot(a.e1, r), stiffness * dot(a.e2, r)
+        e1, e2 = a.e1, a.e2
+        k1, k2 = stiffness * dot(e1, r), stiffness * dot(e2, r)
+        f1, f2 = k1 + a.damping * dot(e1, w), k2 + a.damping * dot(e2, w)
+        m1, m2 = -depth * f2, depth * f1
         # At forces in the noise the moment's slope by the depth is a guess that
         # multiplies itself and would pull the depth towards the sensor.
         seen = ramp(sqrt(f1 * f1 + f2 * f2), self.p.depth_above)
-        H = np.zeros((4, n))
-        H[:, 0:3] = lateral_jacobian(
-            seen * f1, seen * f2, depth, u, a.e1, a.e2, stiffness
+        M = np.array(
+            lateral_jacobian(seen * f1, seen * f2, depth, u, e1, e2, stiffness)
         )
-        for i in self.parts:
-            H[:, i : i + 3] = H[:, 0:3]
+        H = M.dot(self.total)
         H[:, n - 1] = (k1, k2, -depth * k2, depth * k1)
         HP = H.dot(P)
         S = HP.dot(H.T)
         rf, rm, bias = self.noise(stiffness, depth)
         rf = rf / a.averaged + bias
         rm = rm / a.averaged + self.p.moment_bias**2
-        S[0, 0] += rf
-        S[1, 1] += rf
-        S[2, 2] += rm
-        S[3, 3] += rm
+        S.reshape(-1)[::5] += (rf, rf, rm, rm)
         z = a.z
         y = [z[0] - f1, z[1] - f2, z[2] - m1, z[3] - m2]
         return Innovation(y, H, HP, S, w, solve(S, HP, y), u, max(seen, a.turning))

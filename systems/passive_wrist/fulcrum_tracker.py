@@ -61,6 +61,7 @@ class FulcrumTracker:
         "force",  # lateral force of the last sample, in N
         "walk",  # of the mean, from what the breathing's fit left, in m/sqrt(s)
         "summed",  # samples in the sums
+        "time",  # of the last update, in s; kept for the block
     )
 
     def __init__(self, params: FulcrumParams) -> None:
@@ -79,7 +80,7 @@ class FulcrumTracker:
         x, P = self.filter.prior()
         z = np.zeros(self.size)
         z[: self.filter.n], z[self.filter.n : self._record] = x, P.reshape(-1)
-        z[self.at("nis")] = 1.0
+        z[self.at("nis")], z[self.at("time")] = 1.0, -self.p.period
         return z
 
     def at(self, name: str) -> int:

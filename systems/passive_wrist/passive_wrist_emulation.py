@@ -124,14 +124,14 @@ class PassiveWristEmulation(Block):
             lag = 0.0
         ahead = self._p.horizon
         given = WristInput(
-            p_WP=[tool[k] + lag * tool[6 + k] for k in (0, 1, 2)],
-            v_WP=tool[6:9],
-            p_WS=s[0:3],
-            u=s[3:6],
-            f=w[0:3],
-            valid=w[6] > 0.5 and isfinite(sum(w)),
-            p_WI=[p_WI[k] + ahead * v_WI[k] for k in (0, 1, 2)],
-            v_WI=v_WI,
+            [tool[k] + lag * tool[6 + k] for k in (0, 1, 2)],
+            tool[6:9],
+            s[0:3],
+            s[3:6],
+            w[0:3],
+            w[6] > 0.5 and isfinite(sum(w)),
+            [p_WI[k] + ahead * v_WI[k] for k in (0, 1, 2)],
+            v_WI,
             stiffness=e[8],
             stiffness_sigma=e[9],
             sigma_across=e[6],

@@ -25,14 +25,27 @@ def _walk(seed: int, block: int) -> np.ndarray:
     return before + np.cumsum(_normal(seed, block, 1), axis=0)
 
 
-def white(seed: int, sample: int) -> np.ndarray:
-    """White noise of unit variance at a sample >= 0, shape (6,)."""
-    return _normal(seed, sample // _BLOCK, 0)[sample % _BLOCK]
+@lru_cache(maxsize=256)
+def _faults(
+    seed: int, block: int, white: tuple[float, ...], drift: tuple[float, ...]
+) -> list[list[float]]:
+    noise = _normal(seed, block, 0) * white + _walk(seed, block) * drift
+    rows: list[list[float]] = noise.tolist()
+    return rows
 
 
-def walk(seed: int, sample: int) -> np.ndarray:
-    """Random walk of unit steps at a sample >= 0, shape (6,)."""
-    return _walk(seed, sample // _BLOCK)[sample % _BLOCK]
+def fault(
+    seed: int, sample: int, white: tuple[float, ...], drift: tuple[float, ...]
+) -> list[float]:
+    """What noise adds to the reading of a sample >= 0.
+
+    Args:
+        seed: Of the sensor.
+        sample: Number of the reading.
+        white: Standard deviation of each axis' white noise (6).
+        drift: Step of each axis' random walk, each sample (6).
+    """
+    return _faults(seed, sample // _BLOCK, white, drift)[sample % _BLOCK]
 
 
 def mean_before_start(seed: int, samples: int) -> np.ndarray:

@@ -29,7 +29,10 @@ from plants.instruments.instrument import InstrumentParams
 from systems.common.block import Block
 from systems.passive_wrist import sensor_noise
 
+type Vector = list[float]
+
 _GRAVITY = 9.81
+_SILENCE = [0.0] * 7
 
 
 @dataclass
@@ -140,6 +143,11 @@ def instrument_wrench(
     return force, cross(u, s)
 
 
+def silent(lost: Sequence[float], time: float) -> bool:
+    """Whether a time lies between the pairs of start and end times."""
+    return any(a <= time < b for a, b in zip(lost[::2], lost[1::2], strict=True))
+
+
 def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
     """The cross product of two 3-vectors."""
     return [
@@ -233,13 +241,13 @@ class ToolWrench(Block):
         self._joint, self._body = joint, body
         self._sleeve, self._sleeve_mass = sleeve, share * sleeve_mass
         step = math.sqrt(p.period)
-        self._noise = np.array([p.force_noise] * 3 + [p.moment_noise] * 3)
-        self._drift = step * np.array([p.force_drift] * 3 + [p.moment_drift] * 3)
+        self._noise = (p.force_noise,) * 3 + (p.moment_noise,) * 3
+        self._drift = (step * p.force_drift,) * 3 + (step * p.moment_drift,) * 3
         offset = np.array([p.force_offset] * 3 + [p.moment_offset] * 3)
         tare = offset + self._noise * sensor_noise.mean_before_start(
             p.seed, p.tare_samples
         )
-        self._zero = offset - (tare if p.tare_samples else 0.0)
+        self._zero = (offset - (tare if p.tare_samples else 0.0)).tolist()
         self._forces = self.DeclareAbstractInputPort(
             "reaction_forces", Value([SpatialForce.Zero()])
         )
@@ -268,15 +276,15 @@ class ToolWrench(Block):
         else:
             self.vector_out("wrench", 7, self._calc_wrench, feeling)
 
-    def _calc_shaft(self, context: Any) -> tuple[list[float], list[float], Any]:
+    def _calc_shaft(self, context: Any) -> tuple[list[float], Vector, list[Vector]]:
+        """The port's vector, angular velocity, and the rows of R_WM."""
         X_WM = self._poses.Eval(context)[self._body]
         V_WM = self._velocities.Eval(context)[self._body]
-        R_WM = X_WM.rotation().matrix()
-        u = R_WM[:, 2].tolist()
+        R_WM = X_WM.rotation().matrix().tolist()
+        u = [R_WM[0][2], R_WM[1][2], R_WM[2][2]]
         w = V_WM.rotational().tolist()
-        du = cross(w, u)
-        shaft = [*X_WM.translation(), *u, *V_WM.translational(), *du]
-        return shaft, w, R_WM
+        p_WM, v_WM = X_WM.translation().tolist(), V_WM.translational().tolist()
+        return [*p_WM, *u, *v_WM, *cross(w, u)], w, R_WM
 
     def _shaft_vector(self, context: Any) -> Sequence[float]:
         return self._shaft.Eval(context)[0]
@@ -284,51 +292,38 @@ class ToolWrench(Block):
     def _calc_wrench(self, context: Any) -> Sequence[float]:
         p = self._params
         shaft, w, R_WM = self._shaft.Eval(context)
-        A_WM = self._accelerations.Eval(context)[self._body]
+        accelerations = self._accelerations.Eval(context)
+        A_WM = accelerations[self._body]
         F = self._forces.Eval(context)[self._joint]
         time = context.get_time()
-        sample = max(0, round(time / p.period))
-        fault = (
-            self._noise * sensor_noise.white(p.seed, sample)
-            + self._drift * sensor_noise.walk(p.seed, sample)
-            + self._zero
+        fault = sensor_noise.fault(
+            p.seed, max(0, round(time / p.period)), self._noise, self._drift
         )
-        f_M, m_M = F.translational() + fault[:3], F.rotational() + fault[3:]
-        u, du = shaft[3:6], shaft[9:12]
-        turn, spin = cross(A_WM.rotational().tolist(), u), cross(w, du)
-        ddu = [turn[k] + spin[k] for k in (0, 1, 2)]
-        f, m = instrument_wrench(
-            u,
-            ddu,
-            A_WM.translational().tolist(),
-            self._mass,
-            self._centre,
-            self._inertia,
-        )
-        if self._sleeve >= 0:
-            a = self._accelerations.Eval(context)[self._sleeve].translational()
-            p_WC = self._poses.Eval(context)[self._sleeve].translation()
-            b = [self._sleeve_mass * x for x in a.tolist()]
-            moment = cross((p_WC - shaft[0:3]).tolist(), b)
-            f = [f[k] + b[k] for k in (0, 1, 2)]
-            m = [m[k] + moment[k] for k in (0, 1, 2)]
-        F_W, M_W = R_WM.dot(f_M).tolist(), R_WM.dot(m_M).tolist()
-        peak_f, peak_m = float(abs(f_M).max()), float(abs(m_M).max())
+        ideal = F.translational().tolist() + F.rotational().tolist()
+        read = [x + e + o for x, e, o in zip(ideal, fault, self._zero, strict=True)]
+        peak_f = max(abs(read[0]), abs(read[1]), abs(read[2]))
+        peak_m = max(abs(read[3]), abs(read[4]), abs(read[5]))
         lost = any(
             a <= time < b for a, b in zip(p.lost[::2], p.lost[1::2], strict=True)
         )
-        in_range = peak_f <= p.force_range and peak_m <= p.moment_range
-        if lost or not in_range:  # a NaN is not in range either
-            return [0.0] * 7
-        return [
-            f[0] - F_W[0],
-            f[1] - F_W[1],
-            f[2] - F_W[2],
-            m[0] - M_W[0],
-            m[1] - M_W[1],
-            m[2] - M_W[2],
-            1.0,
-        ]
+        if lost or not (peak_f <= p.force_range and peak_m <= p.moment_range):
+            return _SILENCE  # a NaN is not in range either
+        u, du = shaft[3:6], shaft[9:12]
+        turn, spin = cross(A_WM.rotational().tolist(), u), cross(w, du)
+        ddu = [turn[0] + spin[0], turn[1] + spin[1], turn[2] + spin[2]]
+        a_WM = A_WM.translational().tolist()
+        f, m = instrument_wrench(u, ddu, a_WM, self._mass, self._centre, self._inertia)
+        if self._sleeve >= 0:
+            a = accelerations[self._sleeve].translational().tolist()
+            p_WC = self._poses.Eval(context)[self._sleeve].translation().tolist()
+            b = [self._sleeve_mass * x for x in a]
+            moment = cross([p_WC[k] - shaft[k] for k in (0, 1, 2)], b)
+            f = [f[k] + b[k] for k in (0, 1, 2)]
+            m = [m[k] + moment[k] for k in (0, 1, 2)]
+        for k, (x, y, z) in enumerate(R_WM):
+            f[k] -= x * read[0] + y * read[1] + z * read[2]
+            m[k] -= x * read[3] + y * read[4] + z * read[5]
+        return [*f, *m, 1.0]
 
     def _oldest(self, context: Any) -> Sequence[float]:
         return context.get_discrete_state(self._late).value()[:7]

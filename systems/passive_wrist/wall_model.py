@@ -37,35 +37,6 @@ def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def lateral_wrench(
-    r: Vector,
-    w: Vector,
-    u: Vector,
-    e1: Vector,
-    e2: Vector,
-    stiffness: float,
-    damping: float,
-) -> tuple[float, float, float, float, float]:
-    """What the sensor should read laterally.
-
-    Args:
-        r: p_I - p_S, fulcrum from the sensor's origin, in m.
-        w: v_I - v_S - lambda du/dt, wall against shaft at the contact, in m/s.
-        u: Shaft's unit vector.
-        e1: Lateral basis.
-        e2: Lateral basis.
-        stiffness: K in N/m.
-        damping: D in N s/m.
-
-    Returns:
-        f1, f2 in N, m1, m2 in N m, lambda in m.
-    """
-    depth = dot(u, r)
-    f1 = stiffness * dot(e1, r) + damping * dot(e1, w)
-    f2 = stiffness * dot(e2, r) + damping * dot(e2, w)
-    return f1, f2, -depth * f2, depth * f1, depth
-
-
 def lateral_jacobian(
     f1: float,
     f2: float,
