@@ -63,19 +63,23 @@ def trajectory(run: Any) -> Figure:
 
 
 def speeds(run: Any) -> Figure:
-    """Speeds of the guide point over time (Figures 7, 8 below), and the distance."""
+    """Speeds of the robot's tip over time (Figures 7, 8 below), and the distances.
+
+    The guide point's velocities v mean v / s at the tip. The obstacle's speed is that
+    of its closest point: its tip's, by the share l/L.
+    """
     figure = new_figure(7.0, 5.6)
     time = run.signals["time"]
     guide = run.matrix("planner.guide")
-    v_1 = np.linalg.norm(run.matrix("planner.v1"), axis=1)
-    v_R = np.linalg.norm(run.matrix("planner.v_R"), axis=1)
-    # The obstacle's speed where it is closest: its tip's, by the share l/L.
+    s = np.maximum(guide[:, 7], run.scenario.navigation.min_proportion)
+    v_1 = np.linalg.norm(run.matrix("planner.v1"), axis=1) / s
+    v_R = np.linalg.norm(run.matrix("planner.v_R"), axis=1) / s
     v_O = np.linalg.norm(run.matrix("obstacle.tip_velocity"), axis=1) * guide[:, 8]
     upper = add_axes(figure, 2, 1, 1)
-    upper.plot(time, v_1 * MM, "--", color=COLORS["accent"], label="potential field v1")
     upper.plot(time, v_R * MM, "-", color=COLORS["robot"], label="commanded v_R")
+    upper.plot(time, v_1 * MM, "--", color=COLORS["accent"], label="field v_1")
     upper.plot(time, v_O * MM, ":", color=COLORS["obstacle"], label="obstacle at M_O")
-    upper.set(ylabel="speed at the guide point [mm/s]", xlim=(0, time[-1]))
+    upper.set(ylabel="speed of the tip [mm/s]", xlim=(0, time[-1]), ylim=(0, None))
     upper.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     clearance = run.matrix("clearance") * MM

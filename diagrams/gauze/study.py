@@ -39,6 +39,12 @@ SIGNALS: dict[str, tuple[str, ...]] = {
     "planner.v3": XYZ,
     "planner.weights": ("c1", "c2", "c3"),
     "planner.v_R": XYZ,
+    "navigation.tool": (
+        *SHAFT,
+        *(f"v_{axis}" for axis in XYZ),
+        *(f"du_{axis}" for axis in XYZ),
+        "time",
+    ),
     "navigation.stop": ("code",),
     "joints.posture": tuple(f"q{i}" for i in range(1, 8)),
     "joints.status": ("code",),
@@ -90,5 +96,5 @@ STUDY = Study(
         "target.p_WG",
         "obstacle.p_WG",
     ),
-    view=View(camera=(0.55, -0.62, 0.16), target=(0.0, 0.0, -0.02)),
+    view=View(camera=(0.40, -0.50, 0.10), target=(-0.01, 0.0, -0.02)),
 )

@@ -5,11 +5,10 @@ looks ahead: where O's predicted motion crosses the guide point's way, it slows
 the robot so that the surgeon passes first: v_2 = -(1 - scale) v_1.
 
 Crossing: within the horizon O's shaft sweeps the triangle of its fulcrum, its
-tip now and its predicted tip. The guide point's way is the ray from M_R along
-v_1. Where the ray pierces the triangle, Table II gets the distance from M_R
-and the time at which O's shaft is there. A near miss (the ray passes a little
-beyond O's tip, O has only just passed, the crossing lies a little behind M_R
-or beyond the goal) counts in part, so that v_2 has no steps.
+tip now and its predicted tip. The guide point's way goes from M_R along v_1, as
+far as the goal is. From where the way comes near the triangle, Table II gets the
+distance from M_R and the time at which O's shaft is there. Short passages and
+near misses count in part, so that v_2 has no steps.
 
 An obstacle that stands has no crossing time: v_2 = 0, it is the potential
 field's task (the paper's static case).
@@ -46,8 +45,6 @@ TABLE_II = [
 ]
 """Rows: time until O crosses (TIMES); columns: distance to there (DISTANCES)."""
 
-_JUST_PASSED = 0.1  # s; since when a crossing that is over counts no more
-
 
 @dataclass
 class VelocityCorrectionsParams:
@@ -63,7 +60,8 @@ class VelocityCorrectionsParams:
             die out, s.
         moving_speed: Speed of O's tip from which on corrections count in full,
             m/s; not at all below half of it.
-        miss_distance: How near a miss must be to count, m.
+        near_distance: How near the way must come to the swept triangle, m; a
+            passage shorter than this counts in part.
     """
 
     distances: list[float] = field(
@@ -76,7 +74,7 @@ class VelocityCorrectionsParams:
     horizon: float = 2.0
     acceleration_time: float = 0.2
     moving_speed: float = 0.01
-    miss_distance: float = 0.01
+    near_distance: float = 0.01
 
     def check(self) -> None:
         """Checks the values.
@@ -99,7 +97,7 @@ class VelocityCorrectionsParams:
                 raise ValueError(f"{name}={values} must increase")
         if self.scales[0] != 0.0 or self.scales[-1] != 1.0:
             raise ValueError(f"scales={self.scales} must start at 0 and end at 1")
-        for name in ("horizon", "acceleration_time", "moving_speed", "miss_distance"):
+        for name in ("horizon", "acceleration_time", "moving_speed", "near_distance"):
             value = getattr(self, name)
             if not 0.0 < value < float("inf"):
                 raise ValueError(f"{name}={value} must be finite and > 0")
@@ -140,45 +138,57 @@ def crossing(
     """
     none = (0.0, 0.0, 0.0)
     vx, vy, vz = v1
-    v_o = velocity(obstacle)
     speed = sqrt(vx * vx + vy * vy + vz * vz)
-    moving = 2.0 * norm(v_o) / params.moving_speed - 1.0
+    moving = 2.0 * norm(velocity(obstacle)) / params.moving_speed - 1.0
     if speed < 1e-9 or moving <= 0.0:
         return none
     g = fulcrum(obstacle)
     a = sub(obstacle[0:3], g)
     b = sub(predicted_tip(obstacle, params.horizon, params.acceleration_time), g)
     n = cross(a, b)
-    nx, ny, nz = n
-    n2 = nx * nx + ny * ny + nz * nz
-    approach = (vx * nx + vy * ny + vz * nz) / speed
-    # O does not sweep, or the way lies in the plane that it sweeps.
-    if n2 < 1e-16 or approach * approach < 1e-6 * n2:
+    n2 = dot(n, n)
+    if n2 < 1e-16:  # O slides along itself
         return none
+    # At the distance d on the way, over the plane of the sweep by h:
+    # foot = alpha a + beta b, h = h0 + h1 d, alpha and beta likewise.
     m = sub(guide[0:3], g)
-    distance = -dot(m, n) / approach
-    x = along(m, distance / speed, v1)
-    # x = alpha a + beta b; alpha + beta = 1 on the line of O's tip.
-    alpha = dot(cross(x, b), n) / n2
-    beta = dot(cross(a, x), n) / n2
-    reach = alpha + beta
-    if reach < 1e-3:  # at or behind O's fulcrum
+    e = (vx / speed, vy / speed, vz / speed)
+    size = sqrt(n2)
+    h0, h1 = dot(m, n) / size, dot(e, n) / size
+    b_n, n_a = cross(b, n), cross(n, a)
+    alpha0, alpha1 = dot(m, b_n) / n2, dot(e, b_n) / n2
+    beta0, beta1 = dot(m, n_a) / n2, dot(e, n_a) / n2
+    near = params.near_distance
+    low, high = 0.0, norm(sub(guide[9:12], guide[0:3])) + near
+    for c0, c1 in (
+        (near - h0, -h1),
+        (near + h0, h1),
+        (alpha0, alpha1),
+        (beta0, beta1),
+        (1.0 - alpha0 - beta0, -alpha1 - beta1),
+    ):
+        # Keep the part of the way with c0 + c1 d >= 0.
+        if c1 > 1e-12:
+            low = max(low, -c0 / c1)
+        elif c1 < -1e-12:
+            high = min(high, -c0 / c1)
+        elif c0 < 0.0:
+            return none
+    if low >= high:
         return none
-    time = params.horizon * beta / reach
-    miss = params.miss_distance
-    remaining = norm(sub(guide[9:12], guide[0:3]))
+    beta = max(0.0, beta0 + beta1 * low)
+    reach = alpha0 + alpha1 * low + beta
+    time = params.horizon * beta / max(reach, 1e-9)
+    h_low, h_high = h0 + h1 * low, h0 + h1 * high
+    height = 0.0 if h_low * h_high < 0.0 else min(abs(h_low), abs(h_high))
     degree = min(
         1.0,
         moving,
-        distance / miss + 1.0,
-        (remaining - distance) / miss + 1.0,
-        (1.0 - reach) * norm(a) / miss + 1.0,
-        time / _JUST_PASSED + 1.0,
+        (high - low) / near,
+        2.0 * (1.0 - height / near),
         4.0 * (1.0 - time / params.horizon),
     )
-    if degree <= 0.0:
-        return none
-    return max(distance, 0.0), max(time, 0.0), degree
+    return (low, time, degree) if degree > 0.0 else none
 
 
 class SpeedScale:

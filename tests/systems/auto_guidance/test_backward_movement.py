@@ -1,0 +1,95 @@
+"""Backward movement: equation (5)."""
+
+from math import exp, nan
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+import pytest
+
+from systems.auto_guidance.backward_movement import (
+    BackwardMovement,
+    BackwardMovementParams,
+    backward_movement,
+    contact_velocity,
+)
+from systems.auto_guidance.signals import GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
+
+DT = 1.0 / 60.0
+TIP_GUIDE = [*GUIDE_EXAMPLE[:8], 1.0, *GUIDE_EXAMPLE[9:]]
+
+
+def moving(v):
+    return [*OBSTACLE_EXAMPLE[:3], *v, *OBSTACLE_EXAMPLE[6:]]
+
+
+def settle(params, v3, v, seconds):
+    for _ in range(round(seconds / DT)):
+        v3 = backward_movement(params, v3, DT, TIP_GUIDE, moving(v))
+    return v3
+
+
+def test_takes_up_the_obstacles_velocity_and_stops_with_it():
+    params = BackwardMovementParams()
+    v = (0.01, -0.04, 0.02)
+    v3 = settle(params, (0.0, 0.0, 0.0), v, 1.0)
+    np.testing.assert_allclose(v3, v, rtol=1e-6)
+    v3 = settle(params, v3, (0.0, 0.0, 0.0), 1.0)
+    assert np.linalg.norm(v3) < 1e-9
+
+
+def test_the_time_constant_is_one_over_b():
+    params = BackwardMovementParams(gain=5.0)
+    v3 = settle(params, (0.0, 0.0, 0.0), (0.0, 0.04, 0.0), 0.2)
+    assert v3[1] == pytest.approx(0.04 * (1 - exp(-1.0)))
+
+
+def test_printed_form_grows_while_the_obstacle_moves_and_stays_when_it_stops():
+    params = BackwardMovementParams(form="printed", gain=5.0)
+    v3 = settle(params, (0.0, 0.0, 0.0), (0.0, 0.04, 0.0), 2.0)
+    assert v3[1] == pytest.approx(5.0 * 0.04 * 2.0)
+    assert settle(params, v3, (0.0, 0.0, 0.0), 2.0) == pytest.approx(v3)
+
+
+def test_contact_velocity_is_that_of_the_material_point():
+    # O hangs along -z; half way down it turns at half the speed, slides at all of it.
+    obstacle = [0, 0, -0.1, 0.04, 0, 0.02, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0]
+    guide = [*GUIDE_EXAMPLE[:8], 0.5, *GUIDE_EXAMPLE[9:]]
+    np.testing.assert_allclose(contact_velocity(guide, obstacle), (0.02, 0, 0.02))
+
+
+@pytest.mark.parametrize(
+    "obstacle",
+    [[nan] * 17, [*OBSTACLE_EXAMPLE[:15], 0.0, 9.0], moving((nan, 0.0, 0.0))],
+)
+def test_dies_out_without_a_usable_obstacle(obstacle):
+    params = BackwardMovementParams()
+    v3 = backward_movement(params, (0.03, 0.0, 0.0), DT, TIP_GUIDE, obstacle)
+    assert 0.0 < v3[0] < 0.03 and v3[1:] == (0.0, 0.0)
+
+
+def test_block_output_is_the_step_that_its_update_makes():
+    dut = BackwardMovement()
+    context = dut.CreateDefaultContext()
+    dut.GetInputPort("guide").FixValue(context, GUIDE_EXAMPLE)
+    dut.GetInputPort("obstacle").FixValue(context, OBSTACLE_EXAMPLE)
+    expected = backward_movement(
+        BackwardMovementParams(), (0, 0, 0), DT, GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
+    )
+    np.testing.assert_allclose(dut.GetOutputPort("v3").Eval(context), expected)
+    Simulator(dut, context).AdvanceTo(0.5 * DT)
+    np.testing.assert_allclose(
+        context.get_discrete_state_vector().value(), [*expected, 0.0]
+    )
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"form": "paper"}, "form='paper' must be one of corrected, printed"),
+        ({"gain": -2.0}, r"gain=-2.0 must be finite and > 0"),
+        ({"period": 0.0}, r"period=0.0 must be finite and > 0"),
+    ],
+)
+def test_bad_parameters(change, message):
+    with pytest.raises(ValueError, match=message):
+        BackwardMovement(BackwardMovementParams(**change))
