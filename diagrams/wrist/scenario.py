@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass, field
 
-from diagrams.common.scenario import Scenario
+from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
 from systems.auto_guidance.joint_commands import JointCommandsParams
 from systems.passive_wrist.arc_navigation import ArcParams
+from systems.passive_wrist.wrist_law import MODES
 
 
 @dataclass
@@ -30,12 +31,14 @@ class WristScenario(Scenario, WristSettings):
 
     Attributes:
         measure_from: Force and error figures start here [s].
+        compare: Modes that are run as well and drawn beside it.
         event: Time of the wall's jump, for `time_to_2N` and `time_to_02N`; negative
             if there is none [s].
     """
 
     measure_from: float = 0.0
     event: float = -1.0
+    compare: list[str] = field(default_factory=list)
     robot: WristTool = field(default_factory=WristTool)
     arcs: ArcParams = field(default_factory=ArcParams)
     joints: JointCommandsParams = field(default_factory=JointCommandsParams)
@@ -50,3 +53,6 @@ def check(scenario: WristScenario) -> None:
         if hasattr(part, "check"):
             part.check()
     check_wrist(scenario)
+    for mode in scenario.compare:
+        if mode not in MODES:
+            raise ScenarioError(f"compare={mode!r}: choose from {', '.join(MODES)}")

@@ -11,6 +11,7 @@ from math import exp, pi, sqrt
 
 import numpy as np
 
+from plants.abdomen.wall_motion import wave
 from systems.passive_wrist.fulcrum_filter import FulcrumParams, Sample
 from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
 from systems.passive_wrist.wall_model import dot
@@ -24,16 +25,6 @@ from systems.passive_wrist.wrist_law import (
 )
 
 LENGTH, INSIDE = 0.40, 0.18
-
-
-def ventilator(phase: float) -> float:
-    """A ventilator's wave in [-1, 1]: smooth in, sharp out, I:E 1:1.5."""
-    phase %= 1.0
-    if phase < 0.4:
-        return -float(np.cos(pi * phase / 0.4))
-    return (
-        2.0 * exp(-(phase - 0.4) / 0.12) - 1.0 - 2.0 * exp(-5.0) * (phase - 0.4) / 0.6
-    )
 
 
 @dataclass
@@ -58,7 +49,7 @@ class Wall:
     def position(self, t: float) -> list[float]:
         """True fulcrum in m."""
         phase = self.rate * t + self.phase
-        g = np.sin(2 * pi * phase) if self.wave == "sine" else ventilator(phase)
+        g = wave(self.wave, phase)
         s = min(max((t - self.step_at) / self.step_time, 0.0), 1.0)
         r = min(max((t - self.rise_at) / self.rise_time, 0.0), 1.0)
         r = r * r * (3 - 2 * r)
