@@ -1,6 +1,7 @@
 """Figure 2's "passive wrist emulation control", for every diagram that has an arm."""
 
 from dataclasses import dataclass, field, replace
+import logging
 from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
@@ -92,6 +93,16 @@ def check_wrist(scenario: Any) -> None:
             )
 
 
+def _not_of_joint_limits(record: logging.LogRecord) -> bool:
+    """Whether a log record is not Drake's warning of joint limits.
+
+    A reaction force is asked of the continuous plant's forward dynamics, which
+    knows no joint limits and says so once. CENIC, which moves the arm, knows them,
+    and the joints' commands keep away from them.
+    """
+    return "does not handle joint limits" not in record.getMessage()
+
+
 def add_wrist(
     builder: DiagramBuilder, bedside: Bedside, scenario: Any
 ) -> dict[str, Any]:
@@ -108,6 +119,7 @@ def add_wrist(
     Raises:
         ValueError: If a parameter makes no sense or the sensor's frame is not there.
     """
+    logging.getLogger("drake").addFilter(_not_of_joint_limits)
     guess = [
         p + e for p, e in zip(scenario.robot.p_WG, scenario.first_guess, strict=True)
     ]

@@ -28,7 +28,7 @@ def forces(runs: Mapping[str, Any], start: float) -> Figure:
     """
     figure = new_figure(7.0, 5.0)
     upper, lower = add_axes(figure, 2, 1, 1), add_axes(figure, 2, 1, 2)
-    drawn = 0.01  # the smallest force worth a place on the logarithmic axis
+    drawn = 1e-3  # a logarithmic axis has no zero
     for order, (mode, run) in enumerate(runs.items()):
         name, color = MODES[mode]
         time = run.signals["time"]
@@ -40,14 +40,16 @@ def forces(runs: Mapping[str, Any], start: float) -> Figure:
         off = run.signals["wall.fulcrum_error"] * MM
         lower.semilogy(time, np.maximum(off, drawn), **style)
     upper.axhline(5.0, color="k", lw=0.6, ls="--")
-    upper.text(0.02, 5.3, "force limit", fontsize=8)
+    upper.text(time[-1], 5.4, "force limit", fontsize=8, ha="right")
     for axes in (upper, lower):
         axes.axvline(start, color=COLORS["muted"], lw=0.8, ls=":")
         axes.set_xlim(0.0, time[-1])
     top = max(20.0, upper.get_ylim()[1])
-    upper.set(ylabel="lateral force [N]", ylim=(drawn, top))
-    lower.set(xlabel="time [s]", ylabel="shaft off fulcrum [mm]")
-    upper.legend(ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+    upper.set(ylabel="lateral force [N]", ylim=(3e-3, top))
+    lower.set(xlabel="time [s]", ylabel="shaft off fulcrum [mm]", ylim=(3e-3, None))
+    upper.legend(
+        frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8
+    )
     return figure
 
 
@@ -66,6 +68,7 @@ def estimate(run: Any, start: float) -> Figure:
     middle = true[:, :3].mean() * MM
     places[0].set(ylabel="fulcrum [mm]", ylim=(middle - span, middle + span))
     places[0].legend(
+        frameon=False,
         ncols=3,
         title="wide: true, thin: estimated",
         title_fontsize=8,
@@ -95,7 +98,7 @@ def estimate(run: Any, start: float) -> Figure:
     )
     places[1].axhline(1.0, color="k", lw=0.6, ls=":")
     places[1].set(ylabel="error [mm]", ylim=(3e-3, 60.0))
-    places[1].legend(ncols=4, fontsize=7, loc="upper right")
+    places[1].legend(frameon=False, ncols=4, fontsize=7, loc="upper right")
     motion, settings = run.scenario.wall_motion, run.scenario
     stiffness = [settings.abdomen.stiffness * motion.stiffness_factor(t) for t in time]
     places[2].semilogy(time, stiffness, color=COLORS["muted"], lw=2.4, label="true")
@@ -106,7 +109,7 @@ def estimate(run: Any, start: float) -> Figure:
         label="believed",
     )
     places[2].set(ylabel="stiffness [N/m]", ylim=(80.0, 4e3))
-    places[2].legend(ncols=2, loc="upper right")
+    places[2].legend(frameon=False, ncols=2, loc="upper right")
     if any(motion.breathing):
         places[3].axhline(motion.rate, color=COLORS["muted"], lw=2.4)
     places[3].plot(time, run.signals["wrist.fulcrum.rate"], color=COLORS["robot"])
@@ -117,7 +120,7 @@ def estimate(run: Any, start: float) -> Figure:
         lw=0.8,
         label="speed scale (1 at the top)",
     )
-    places[3].legend(loc="lower right", fontsize=8)
+    places[3].legend(frameon=False, loc="lower right", fontsize=8)
     places[3].set(ylabel="breathing [Hz]", xlabel="time [s]", ylim=(-0.01, 0.42))
     for axes in places:
         axes.set_xlim(0.0, time[-1])

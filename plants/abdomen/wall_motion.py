@@ -18,7 +18,7 @@ from plants.abdomen.abdomen import Abdomen
 from plants.common.actuation import hold_still
 
 _INSPIRATION = 0.4  # share of a breath, I:E 1:1.5
-_EXPIRATION = 0.08  # time constant of the passive expiration, share of a breath
+_EXPIRATION = 0.05  # time constant of the passive expiration, share of a breath
 _KNOT = 1.0 / 30.0  # [s]
 
 

@@ -4,7 +4,7 @@ The algorithm stands in `fulcrum_tracker`, the filter in `fulcrum_filter`.
 """
 
 from collections.abc import Sequence
-from math import isfinite, sqrt
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -95,17 +95,13 @@ class FulcrumEstimator(Block):
         z = self._posterior.Eval(context)
         tracker = self._tracker
         p, v = self._ahead(context, z)
-        (xx, xy, xz), (_, yy, yz), (_, _, zz) = tracker.covariance(z).tolist()
-        x, y, s = self._shaft.Eval(context)[3:6].tolist()
-        along = x * x * xx + y * y * yy + s * s * zz
-        along += 2.0 * (x * y * xy + x * s * xz + y * s * yz)
-        across = 0.5 * (xx + yy + zz - along)
+        across, along = tracker.spread(z, self._shaft.Eval(context)[3:6])
         stiffness, sigma = tracker.stiffness(z)
         return [
             *p,
             *v,
-            sqrt(max(across, 0.0)),
-            sqrt(max(along, 0.0)),
+            across,
+            along,
             stiffness,
             sigma,
             tracker.breathing(z),

@@ -10,14 +10,9 @@ from dataclasses import dataclass, field
 from math import cos, exp, log, pi, sin, sqrt
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
-from systems.passive_wrist.wall_model import (
-    Vector,
-    dot,
-    lateral_basis,
-    lateral_jacobian,
-)
+from systems.passive_wrist import fulcrum_kernels as kernels
+from systems.passive_wrist.wall_model import Vector, dot, lateral_basis
 
 
 @dataclass
@@ -37,7 +32,7 @@ class FulcrumParams:
         force_bias: Standard deviation of the slow bias, in N.
         moment_bias: In N m.
         pose_noise: Of the shaft's pose, in m.
-        harmonics: Of the breathing, 1 to 3.
+        harmonics: Of the breathing, 1 to 4.
         learn_above: Force above which K is learnt, in N.
         depth_above: Force above which the moment says something of the depth, in N;
             it counts in full from twice that on.
@@ -111,9 +106,9 @@ class FulcrumParams:
             raise ValueError(
                 f"fulcrum estimator: guess={self.guess} must be 3 numbers in m"
             )
-        if self.harmonics not in (1, 2, 3):
+        if self.harmonics not in (1, 2, 3, 4):
             raise ValueError(
-                f"fulcrum estimator: harmonics={self.harmonics} must be 1, 2 or 3"
+                f"fulcrum estimator: harmonics={self.harmonics} must be 1, 2, 3 or 4"
             )
 
 
@@ -144,35 +139,50 @@ class Sample:
     turning: float = 1.0
 
     def __post_init__(self) -> None:
-        """Takes the four lateral components."""
+        """Takes the lateral force, and packs all for the kernels."""
         self.e1, self.e2 = lateral_basis(self.u)
-        self.z = (
-            dot(self.e1, self.f),
-            dot(self.e2, self.f),
-            dot(self.e1, self.m),
-            dot(self.e2, self.m),
+        self.f1, self.f2 = dot(self.e1, self.f), dot(self.e2, self.f)
+        self.packed = np.array(
+            [
+                *self.p_WS,
+                *self.u,
+                *self.v_WS,
+                *self.du,
+                *self.f,
+                *self.m,
+                self.damping,
+                self.averaged,
+                self.turning,
+            ],
+            float,
         )
 
 
 @dataclass
 class Innovation:
-    """A sample against the state: y = z - h(x), its Jacobian H, S and H P."""
+    """A sample against the state.
 
-    y: list[float]
+    Attributes:
+        y: z - h(x), shape (4,).
+        H: Its Jacobian, shape (4, n).
+        S: Its covariance, shape (4, 4).
+        HP: H P, shape (4, n).
+        gain: The Kalman gain, shape (n, 4).
+        w: Wall against shaft at the contact, in m/s, shape (3,).
+        nis: Normalised innovation squared; 4 degrees of freedom.
+        axial: Weight in [0, 1] of what the sample says along the shaft.
+        u: The shaft's direction, shape (3,).
+    """
+
+    y: np.ndarray
     H: np.ndarray
-    HP: np.ndarray
     S: np.ndarray
-    w: list[float]  # wall against shaft at the contact, in m/s
-    solved: np.ndarray  # S^-1 [H P, y]
-    u: Vector
-    axial: float  # weight in [0, 1] of what the sample says along the shaft
-
-    @property
-    def nis(self) -> float:
-        """Normalised innovation squared; 4 degrees of freedom."""
-        s = self.solved[:, -1].tolist()
-        y = self.y
-        return y[0] * s[0] + y[1] * s[1] + y[2] * s[2] + y[3] * s[3]
+    HP: np.ndarray
+    gain: np.ndarray
+    w: np.ndarray
+    nis: float
+    axial: float
+    u: np.ndarray
 
 
 class FulcrumFilter:
@@ -187,26 +197,15 @@ class FulcrumFilter:
         params.check()
         self.p = params
         self.n = 5 + 6 * params.harmonics
-        self._identity = np.eye(self.n)
         self.total = np.zeros((3, self.n))
         self.parts = [6 * k + 3 for k in range(params.harmonics)]
         for i in (0, *self.parts):
             self.total[:, i : i + 3] = np.eye(3)
-        self._index_turns()
-
-    def _index_turns(self) -> None:
-        """Where the turning of each harmonic stands in the transition matrix."""
-        n = self.n
-        places, turns, partners, slopes = [], [], [], []
-        for k, i in enumerate(self.parts):
-            for j in (0, 1, 2):
-                a, b = i + j, i + 3 + j
-                places += [a * (n + 1), b * (n + 1), a * n + b, b * n + a]
-                turns += [3 * k, 3 * k, 3 * k + 1, 3 * k + 2]
-            partners += [*range(i + 3, i + 6), *range(i, i + 3)]
-            slopes += [-(k + 1.0)] * 3 + [k + 1.0] * 3
-        self._turned, self._turn = np.array(places), np.array(turns)
-        self._partner, self._slope = np.array(partners), np.array(slopes)
+        kernels.warm_up(self.n)
+        p = params
+        self._noise = np.array(
+            [p.force_noise, p.moment_noise, p.force_bias, p.moment_bias, p.pose_noise]
+        )
 
     def prior(self) -> tuple[np.ndarray, np.ndarray]:
         """State and covariance before the first sample, no breathing."""
@@ -232,16 +231,6 @@ class FulcrumFilter:
                 v[j] -= w * (a * s + b * c)
         return p, v
 
-    def noise(self, stiffness: float, depth: float) -> tuple[float, float, float]:
-        """Variances of force (N^2) and moment (N^2 m^2) noise, and of force bias."""
-        p = self.p
-        pose = (stiffness * p.pose_noise) ** 2
-        return (
-            p.force_noise**2 + pose,
-            p.moment_noise**2 + depth**2 * pose,
-            p.force_bias**2,
-        )
-
     def turning(self, u: Vector, v_WP: Vector) -> float:
         """Weight of what the shaft's angle says of the depth, from the tip's v."""
         along = dot(u, v_WP)
@@ -253,10 +242,10 @@ class FulcrumFilter:
         stiffness = exp(x[n - 1])
         depth = sum(a.u[i] * (x[i] - a.p_WS[i]) for i in (0, 1, 2))
         offset = np.array(
-            [(a.z[0] * a.e1[i] + a.z[1] * a.e2[i]) / stiffness for i in (0, 1, 2)]
+            [(a.f1 * a.e1[i] + a.f2 * a.e2[i]) / stiffness for i in (0, 1, 2)]
         )
         U = np.outer(a.u, a.u)
-        noise = self.noise(stiffness, depth)[0] / stiffness**2
+        noise = (self.p.force_noise / stiffness) ** 2 + self.p.pose_noise**2
         x[:3] = np.asarray(a.p_WS) + depth * np.asarray(a.u) + offset
         # An unknown stiffness leaves the offset along the force unknown with it.
         sigma2 = P[n - 1, n - 1]
@@ -272,7 +261,8 @@ class FulcrumFilter:
         P: np.ndarray,
         dt: float,
         walk: float,
-        part_walks: list[float],
+        part_walks: np.ndarray,
+        breathing: bool,
     ) -> None:
         """Moves (x, P) by dt.
 
@@ -281,63 +271,27 @@ class FulcrumFilter:
             P: Its covariance, changed in place.
             dt: In s.
             walk: Random walk of the mean, in m/sqrt(s).
-            part_walks: The same of each harmonic; empty before breathing is known.
+            part_walks: The same of each harmonic.
+            breathing: Whether the harmonics turn.
         """
-        n = self.n
-        diagonal = P.reshape(-1)[:: n + 1]
-        if part_walks:
-            F = self._identity.copy()
-            theta = exp(x[n - 2]) * dt
-            turns = []
-            for k in range(1, len(part_walks) + 1):
-                c, s = cos(k * theta), sin(k * theta)
-                turns += [c, -s, s]
-            F.reshape(-1)[self._turned] = np.array(turns)[self._turn]
-            x[:] = F.dot(x)
-            F[3 : n - 2, n - 2] = theta * self._slope * x[self._partner]
-            np.dot(F.dot(P), F.T, out=P)
-            for i, part in zip(self.parts, part_walks, strict=True):
-                diagonal[i : i + 6] += part**2 * dt
-            diagonal[n - 2] += 1e-4 * dt
-        diagonal[0:3] += walk**2 * dt
-        diagonal[n - 1] += 1e-4 * dt
+        kernels.predict(x, P, dt, walk, part_walks, breathing)
 
     def innovate(self, x: np.ndarray, P: np.ndarray, a: Sample) -> Innovation:
-        """Compares a sample with the state."""
-        n = self.n
-        xs = x.tolist()
-        stiffness, omega = exp(xs[n - 1]), exp(xs[n - 2])
-        s, v, du, u = a.p_WS, a.v_WS, a.du, a.u
-        r = [xs[0] - s[0], xs[1] - s[1], xs[2] - s[2]]
-        w = [-v[0], -v[1], -v[2]]
-        for k, i in enumerate(self.parts, 1):
-            rate = k * omega
-            for j in (0, 1, 2):
-                r[j] += xs[i + j]
-                w[j] -= rate * xs[i + 3 + j]
-        depth = dot(u, r)
-        w = [w[0] - depth * du[0], w[1] - depth * du[1], w[2] - depth * du[2]]
-        e1, e2 = a.e1, a.e2
-        k1, k2 = stiffness * dot(e1, r), stiffness * dot(e2, r)
-        f1, f2 = k1 + a.damping * dot(e1, w), k2 + a.damping * dot(e2, w)
-        m1, m2 = -depth * f2, depth * f1
-        # At forces in the noise the moment's slope by the depth is a guess that
-        # multiplies itself and would pull the depth towards the sensor.
-        seen = ramp(sqrt(f1 * f1 + f2 * f2), self.p.depth_above)
-        M = np.array(
-            lateral_jacobian(seen * f1, seen * f2, depth, u, e1, e2, stiffness)
+        """Compares a sample with the state.
+
+        Raises:
+            ValueError: If the innovation's covariance is not positive definite.
+        """
+        y, H, S, HP, gain, w, nis, seen = kernels.innovate(
+            x, P, a.packed, self._noise, self.p.depth_above
         )
-        H = M.dot(self.total)
-        H[:, n - 1] = (k1, k2, -depth * k2, depth * k1)
-        HP = H.dot(P)
-        S = HP.dot(H.T)
-        rf, rm, bias = self.noise(stiffness, depth)
-        rf = rf / a.averaged + bias
-        rm = rm / a.averaged + self.p.moment_bias**2
-        S.reshape(-1)[::5] += (rf, rf, rm, rm)
-        z = a.z
-        y = [z[0] - f1, z[1] - f2, z[2] - m1, z[3] - m2]
-        return Innovation(y, H, HP, S, w, solve(S, HP, y), u, max(seen, a.turning))
+        if nis < 0.0:
+            raise ValueError(
+                "fulcrum estimator: the innovation's covariance is not positive "
+                f"definite (wrench residual {y.tolist()})"
+            )
+        axial = max(seen, a.turning)
+        return Innovation(y, H, S, HP, gain, w, nis, axial, a.packed[3:6])
 
     def update(self, x: np.ndarray, P: np.ndarray, i: Innovation, held: int) -> None:
         """Kalman update; states from `held` on are considered, not touched.
@@ -348,20 +302,32 @@ class FulcrumFilter:
         noise would drive the depth away. The covariance's update holds for any
         gain (Joseph).
         """
-        n = self.n
-        gain = i.solved[:, :n].T.copy()
-        if held < n:
-            gain[held:] = 0.0
-        if i.axial < 1.0:
-            blocks = gain[: n - 2].reshape(-1, 3, 4)
-            u = np.array(i.u)
-            along = u.dot(blocks)
-            blocks -= ((1.0 - i.axial) * u)[:, None] * along[:, None, :]
-        x += gain.dot(i.y)
-        # P + K S K^T - K H P - (K H P)^T, so written that rounding grows no skew.
-        half = gain.dot(0.5 * i.S.dot(gain.T) - i.HP)
-        half += 0.5 * P
-        np.add(half, half.T, out=P)
+        kernels.update(x, P, i.y, i.S, i.HP, i.gain, i.u, i.axial, held)
+
+    def filter_record(
+        self,
+        x: np.ndarray,
+        P: np.ndarray,
+        record: np.ndarray,
+        dt: float,
+        averaged: int,
+        walk: float,
+        part_walks: np.ndarray,
+    ) -> None:
+        """Filters the entries of a record but the first, in place."""
+        sound = kernels.filter_record(
+            x,
+            P,
+            record,
+            dt,
+            averaged,
+            walk,
+            part_walks,
+            self._noise,
+            self.p.depth_above,
+        )
+        if not sound:
+            raise ValueError("fulcrum estimator: the record cannot be filtered again")
 
     def jump(self, x: np.ndarray, P: np.ndarray, a: Sample, size: float) -> None:
         """The wall has jumped by about `size` m: fits the mean alone, iterated."""
@@ -370,9 +336,8 @@ class FulcrumFilter:
         for _ in range(4):
             i = self.innovate(x, P, a)
             # The innovation seen from the prior, linearised at the iterate.
-            away = i.H[:, 0:3].dot(x[:3] - prior).tolist()
-            i.y = [i.y[j] + away[j] for j in range(4)]
-            x[:3] = prior + i.solved[:, :3].T.dot(i.y)
+            i.y = i.y + i.H[:, 0:3].dot(x[:3] - prior)
+            x[:3] = prior + i.gain[:3].dot(i.y)
         x[:3] = prior
         i.axial = 1.0
         self.update(x, P, i, 3)
@@ -381,17 +346,3 @@ class FulcrumFilter:
 def ramp(value: float, start: float) -> float:
     """0 up to `start`, 1 from twice that on."""
     return min(max(value / start - 1.0, 0.0), 1.0)
-
-
-def solve(S: np.ndarray, HP: np.ndarray, y: list[float]) -> np.ndarray:
-    """S^-1 [H P, y], shape (4, n + 1)."""
-    b = np.empty((4, HP.shape[1] + 1))
-    b[:, :-1] = HP
-    b[:, -1] = y
-    _, solved, info = dposv(S, b)
-    if info != 0:
-        raise ValueError(
-            "fulcrum estimator: the innovation's covariance is not positive "
-            f"definite (wrench residual {y})"
-        )
-    return solved

@@ -22,7 +22,7 @@ import numpy as np
 
 from systems.passive_wrist.breathing_rate import BreathingFit, find_breathing
 from systems.passive_wrist.fulcrum_filter import FulcrumFilter, FulcrumParams, Sample
-from systems.passive_wrist.wall_model import dot
+from systems.passive_wrist.fulcrum_kernels import add_to_record, sample_of, spread
 
 BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0  # phases
 _RECORD = 120  # entries of the record
@@ -103,6 +103,13 @@ class FulcrumTracker:
         P.reshape(-1)[::4] += bias**2
         return P
 
+    def spread(self, z: np.ndarray, u: np.ndarray) -> tuple[float, float]:
+        """Standard deviations of the fulcrum across a shaft and along it, in m."""
+        n = self.filter.n
+        bias = self.p.force_bias * 0.5 / exp(z[n - 1])
+        sigmas: tuple[float, float] = spread(z[n : self._record].reshape(n, n), u, bias)
+        return sigmas
+
     def stiffness(self, z: np.ndarray) -> tuple[float, float]:
         """Believed stiffness in N/m and the standard deviation of its logarithm."""
         n = self.filter.n
@@ -125,7 +132,7 @@ class FulcrumTracker:
         n = f.n
         x, aux = z[:n], z[self._aux : self._parts]
         P = z[n : self._record].reshape(n, n)
-        force = aux[10] = hypot(sample.z[0], sample.z[1])
+        force = aux[10] = hypot(sample.f1, sample.f2)
         aux[1] += 1.0
         if aux[0] == BEFORE:
             f.to_first_force(x, P, sample)
@@ -137,7 +144,7 @@ class FulcrumTracker:
         if guard:
             aux[3] -= p.period
             walk = 0.05  # the rest of a jump that takes more than two samples
-        f.predict(x, P, p.period, walk, self._part_walks(z) if known else [])
+        f.predict(x, P, p.period, walk, self._part_walks(z), known)
         i = f.innovate(x, P, sample)
         nis = i.nis
         if nis > _UNLIKELY and not guard:
@@ -171,37 +178,20 @@ class FulcrumTracker:
         if aux[0] != BEFORE:
             known = aux[0] == BREATHING
             walk = aux[11] if known else self.p.wall_walk
-            parts = self._part_walks(z) if known else []
+            parts = self._part_walks(z)
             P = z[n : self._record].reshape(n, n)
-            f.predict(z[:n], P, self.p.period, walk, parts)
+            f.predict(z[:n], P, self.p.period, walk, parts, known)
             aux[5], aux[12] = 0.0, 0.0  # a record must have no gaps
             z[self._sums : self._aux] = 0.0
         return z
 
-    def _part_walks(self, z: np.ndarray) -> list[float]:
-        rate = self.p.amplitude_walk
-        return [rate * max(a, 3e-4) for a in z[self._parts :].tolist()]
+    def _part_walks(self, z: np.ndarray) -> np.ndarray:
+        return self.p.amplitude_walk * np.maximum(z[self._parts :], 3e-4)
 
-    def _remember(self, z: np.ndarray, a: Sample, w: list[float]) -> None:
+    def _remember(self, z: np.ndarray, a: Sample, w: np.ndarray) -> None:
         """Adds a sample to the record and looks for the breathing in it."""
         sums = z[self._sums : self._aux]
-        # The damping's part is taken out now: later the velocities are gone.
-        d1, d2 = a.damping * dot(w, a.e1), a.damping * dot(w, a.e2)
-        f1, f2 = a.z[0] - d1, a.z[1] - d2
-        depth = dot(a.u, z[:3].tolist()) - dot(a.u, a.p_WS)
-        m1, m2 = a.z[2] + depth * d2, a.z[3] - depth * d1
-        e1, e2 = a.e1, a.e2
-        sums += [
-            *a.p_WS,
-            *a.u,
-            f1 * e1[0] + f2 * e2[0],
-            f1 * e1[1] + f2 * e2[1],
-            f1 * e1[2] + f2 * e2[2],
-            m1 * e1[0] + m2 * e2[0],
-            m1 * e1[1] + m2 * e2[1],
-            m1 * e1[2] + m2 * e2[2],
-            a.turning,
-        ]
+        add_to_record(sums, z[: self.filter.n], a.packed, w)
         aux = z[self._aux : self._parts]
         aux[12] += 1.0
         if aux[12] < self._every:
@@ -212,8 +202,7 @@ class FulcrumTracker:
         sums[:], aux[12] = 0.0, 0.0
         aux[5] = min(aux[5] + 1.0, _RECORD)
         entries = aux[1] // self._every
-        understood = aux[0] == BREATHING and aux[4] < _EXPECTED
-        if aux[5] >= _SHORTEST and entries % _CHECK == 0.0 and not understood:
+        if aux[5] >= _SHORTEST and entries % _CHECK == 0.0:
             self._look(z, record[_RECORD - int(aux[5]) :])
 
     def _look(self, z: np.ndarray, record: np.ndarray) -> None:
@@ -222,12 +211,17 @@ class FulcrumTracker:
         x = z[:n]
         stiffness = exp(x[n - 1])
         p_WS, u, f = record[:, 0:3], record[:, 3:6], record[:, 6:9]
-        depth = ((x[:3] - p_WS) * u).sum(axis=1)
-        lateral = p_WS + depth[:, None] * u + f / stiffness
+        p_WI = self._where(x, len(record)) if aux[0] == BREATHING else x[:3]
+        depth = ((p_WI - p_WS) * u).sum(axis=1)
+        place = p_WS + depth[:, None] * u + f / stiffness
+        # Across the mean shaft: along it the filter's belief would confirm itself.
+        axis = u.mean(axis=0)
+        axis /= sqrt(axis.dot(axis))
+        lateral = place - place.dot(axis)[:, None] * axis
         noise = p.force_noise / sqrt(self._every) / stiffness
         fit = find_breathing(lateral, _RECORD_PERIOD, p.harmonics)
         known = aux[0] == BREATHING
-        if fit is None or fit.amplitude < max(2e-4, 3.0 * noise, 2.0 * fit.residual):
+        if fit is None or not believable(fit, len(record), noise):
             aux[6] = 0.0
             moved = float(np.sqrt(lateral.var(axis=0).sum()))
             still = moved < max(2e-4, 3.0 * noise)
@@ -237,9 +231,25 @@ class FulcrumTracker:
         agrees = abs(fit.rate / aux[7] - 1.0) < 0.06 if aux[7] > 0.0 else False
         aux[6] = aux[6] + 1.0 if agrees else 1.0
         aux[7] = fit.rate
-        wrong = abs(log(2.0 * pi * fit.rate) - x[n - 2]) > 0.1 or self.breathing(z) == 0
-        if aux[6] >= 2.0 and (not known or wrong):
+        # Another rate than the one that is followed: the first may have been found
+        # in less than a breath. It is taken when the record has long said so, or at
+        # once when the wall is not understood.
+        other = abs(log(2.0 * pi * fit.rate) - x[n - 2]) > 0.04 or not self.breathing(z)
+        breaths = fit.rate * len(record) * _RECORD_PERIOD
+        certain = (aux[6] >= 4.0 and breaths > 1.3) or aux[4] > _EXPECTED
+        if aux[6] >= 2.0 and (not known or (other and certain)):
             self._filter_again(z, record, fit, noise)
+
+    def _where(self, x: np.ndarray, entries: int) -> np.ndarray:
+        """The fulcrum at the record's last entries, shape (entries, 3)."""
+        back = -_RECORD_PERIOD * (np.arange(entries)[::-1] + 0.5)
+        omega = exp(x[self.filter.n - 2])
+        place = np.tile(x[:3], (entries, 1))
+        for k, i in enumerate(self.filter.parts, 1):
+            phase = k * omega * back
+            place += np.outer(np.cos(phase), x[i : i + 3])
+            place -= np.outer(np.sin(phase), x[i + 3 : i + 6])
+        return place
 
     def _filter_again(
         self,
@@ -272,19 +282,31 @@ class FulcrumTracker:
         omega = 2.0 * pi * (fit.rate if fit else 0.0) * (p.harmonics + 1)
         aux[11] = sqrt(p.still_walk**2 + 2.0 * omega * left)
         walks = self._part_walks(z)
-        for row in record[1:]:
-            f.predict(x, P, _RECORD_PERIOD, aux[11], walks)
-            f.update(x, P, f.innovate(x, P, self._entry(row)), n - 1)
+        f.filter_record(x, P, record, _RECORD_PERIOD, self._every, aux[11], walks)
+        # An entry is the mean of a tenth of a second: half of that old.
+        f.predict(x, P, 0.5 * _RECORD_PERIOD, 0.0, walks, True)
         z[:n], z[n : self._record] = x, P.reshape(-1)
-        f.predict(
-            z[:n], z[n : self._record].reshape(n, n), 0.5 * _RECORD_PERIOD, 0.0, walks
-        )
         aux[0], aux[4], aux[6] = BREATHING, 1.0, 0.0
 
     def _entry(self, row: np.ndarray) -> Sample:
-        still = [0.0, 0.0, 0.0]
-        v = row.tolist()
-        u = v[3:6]
-        size = sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2)
-        u = [q / size for q in u]
-        return Sample(v[0:3], u, still, still, v[6:9], v[9:12], 0.0, self._every, v[12])
+        """An entry of the record as a sample."""
+        a = sample_of(row, self._every).tolist()
+        return Sample(
+            a[0:3], a[3:6], a[6:9], a[9:12], a[12:15], a[15:18], 0.0, self._every, a[20]
+        )
+
+
+def believable(fit: BreathingFit, entries: int, noise: float) -> bool:
+    """Whether a fitted wave is more than noise, and not a piece of a slower one.
+
+    Args:
+        fit: The fit.
+        entries: Length of its record.
+        noise: Standard deviation of the record's noise, in m.
+    """
+    clear = 2.5 if entries == _RECORD else 4.0
+    if fit.amplitude < max(2e-4, 3.0 * noise, clear * fit.residual):
+        return False
+    breaths = fit.rate * entries * _RECORD_PERIOD
+    # A sharp wave seen for less than a breath fits a quicker one nearly as well.
+    return breaths > 1.3 or fit.residual < 0.04 * fit.amplitude + 1.5 * noise

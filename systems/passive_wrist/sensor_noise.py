@@ -8,6 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
+type Faults = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+
 _BLOCK = 1024
 
 
@@ -26,26 +28,21 @@ def _walk(seed: int, block: int) -> np.ndarray:
 
 
 @lru_cache(maxsize=256)
-def _faults(
-    seed: int, block: int, white: tuple[float, ...], drift: tuple[float, ...]
-) -> list[list[float]]:
-    noise = _normal(seed, block, 0) * white + _walk(seed, block) * drift
-    rows: list[list[float]] = noise.tolist()
-    return rows
+def _faults(seed: int, block: int, faults: Faults) -> np.ndarray:
+    white, drift, offset = faults
+    return _normal(seed, block, 0) * white + _walk(seed, block) * drift + offset
 
 
-def fault(
-    seed: int, sample: int, white: tuple[float, ...], drift: tuple[float, ...]
-) -> list[float]:
-    """What noise adds to the reading of a sample >= 0.
+def fault(seed: int, sample: int, faults: Faults) -> np.ndarray:
+    """What noise adds to the reading of a sample >= 0, shape (6,).
 
     Args:
         seed: Of the sensor.
         sample: Number of the reading.
-        white: Standard deviation of each axis' white noise (6).
-        drift: Step of each axis' random walk, each sample (6).
+        faults: Standard deviation of each axis' white noise, step of its random
+            walk in each sample, and its constant offset (6 each).
     """
-    return _faults(seed, sample // _BLOCK, white, drift)[sample % _BLOCK]
+    return _faults(seed, sample // _BLOCK, faults)[sample % _BLOCK]
 
 
 def mean_before_start(seed: int, samples: int) -> np.ndarray:

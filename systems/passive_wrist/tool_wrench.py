@@ -28,10 +28,8 @@ from plants.abdomen.abdomen import Abdomen
 from plants.instruments.instrument import InstrumentParams
 from systems.common.block import Block
 from systems.passive_wrist import sensor_noise
+from systems.passive_wrist.wrench_kernel import shaft_of, wall_wrench
 
-type Vector = list[float]
-
-_GRAVITY = 9.81
 _SILENCE = [0.0] * 7
 
 
@@ -116,45 +114,9 @@ def transverse_inertia(params: InstrumentParams) -> float:
     return rods + params.gauze_mass * params.length**2
 
 
-def instrument_wrench(
-    u: Sequence[float],
-    ddu: Sequence[float],
-    a: Sequence[float],
-    mass: float,
-    centre: float,
-    inertia: float,
-) -> tuple[list[float], list[float]]:
-    """What carries and moves the instrument alone: lateral part is exact.
-
-    Args:
-        u: Axis, in W.
-        ddu: Its second derivative, in 1/s^2.
-        a: Acceleration of the sensor, in m/s^2.
-        mass: In kg.
-        centre: Distance of the centre of mass from the sensor, in m.
-        inertia: About the sensor, across the axis, in kg m^2.
-
-    Returns:
-        Force in N and moment about the sensor in N m.
-    """
-    b = (a[0], a[1], a[2] + _GRAVITY)
-    force = [mass * (b[k] + centre * ddu[k]) for k in (0, 1, 2)]
-    s = [inertia * ddu[k] + mass * centre * b[k] for k in (0, 1, 2)]
-    return force, cross(u, s)
-
-
 def silent(lost: Sequence[float], time: float) -> bool:
     """Whether a time lies between the pairs of start and end times."""
     return any(a <= time < b for a, b in zip(lost[::2], lost[1::2], strict=True))
-
-
-def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
-    """The cross product of two 3-vectors."""
-    return [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 
 
 def sensor_indices(plant: Any, frame: str) -> tuple[int, int]:
@@ -235,19 +197,24 @@ class ToolWrench(Block):
         p.check()
         instrument = instrument or InstrumentParams()
         share = 1.0 + p.mass_error
-        self._mass = share * instrument.mass
-        self._centre = instrument.centre
-        self._inertia = share * transverse_inertia(instrument)
+        self._instrument = np.array(
+            [
+                share * instrument.mass,
+                instrument.centre,
+                share * transverse_inertia(instrument),
+            ]
+        )
         self._joint, self._body = joint, body
         self._sleeve, self._sleeve_mass = sleeve, share * sleeve_mass
+        self._limit = np.array([p.force_range, p.moment_range])
         step = math.sqrt(p.period)
-        self._noise = (p.force_noise,) * 3 + (p.moment_noise,) * 3
-        self._drift = (step * p.force_drift,) * 3 + (step * p.moment_drift,) * 3
-        offset = np.array([p.force_offset] * 3 + [p.moment_offset] * 3)
-        tare = offset + self._noise * sensor_noise.mean_before_start(
-            p.seed, p.tare_samples
-        )
-        self._zero = (offset - (tare if p.tare_samples else 0.0)).tolist()
+        noise = (p.force_noise,) * 3 + (p.moment_noise,) * 3
+        drift = (step * p.force_drift,) * 3 + (step * p.moment_drift,) * 3
+        zero = np.array([p.force_offset] * 3 + [p.moment_offset] * 3)
+        if p.tare_samples:
+            before = sensor_noise.mean_before_start(p.seed, p.tare_samples)
+            zero = -np.array(noise) * before
+        self._faults = (noise, drift, tuple(zero.tolist()))
         self._forces = self.DeclareAbstractInputPort(
             "reaction_forces", Value([SpatialForce.Zero()])
         )
@@ -276,54 +243,44 @@ class ToolWrench(Block):
         else:
             self.vector_out("wrench", 7, self._calc_wrench, feeling)
 
-    def _calc_shaft(self, context: Any) -> tuple[list[float], Vector, list[Vector]]:
-        """The port's vector, angular velocity, and the rows of R_WM."""
+    def _calc_shaft(self, context: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The port's vector, angular velocity, and R_WM."""
         X_WM = self._poses.Eval(context)[self._body]
         V_WM = self._velocities.Eval(context)[self._body]
-        R_WM = X_WM.rotation().matrix().tolist()
-        u = [R_WM[0][2], R_WM[1][2], R_WM[2][2]]
-        w = V_WM.rotational().tolist()
-        p_WM, v_WM = X_WM.translation().tolist(), V_WM.translational().tolist()
-        return [*p_WM, *u, *v_WM, *cross(w, u)], w, R_WM
+        R_WM, w = X_WM.rotation().matrix(), V_WM.rotational()
+        shaft = shaft_of(R_WM, X_WM.translation(), V_WM.translational(), w)
+        return shaft, w, R_WM
 
-    def _shaft_vector(self, context: Any) -> Sequence[float]:
+    def _shaft_vector(self, context: Any) -> Any:
         return self._shaft.Eval(context)[0]
 
-    def _calc_wrench(self, context: Any) -> Sequence[float]:
+    def _calc_wrench(self, context: Any) -> Any:
         p = self._params
+        time = context.get_time()
+        if p.lost and silent(p.lost, time):
+            return _SILENCE
         shaft, w, R_WM = self._shaft.Eval(context)
         accelerations = self._accelerations.Eval(context)
         A_WM = accelerations[self._body]
         F = self._forces.Eval(context)[self._joint]
-        time = context.get_time()
-        fault = sensor_noise.fault(
-            p.seed, max(0, round(time / p.period)), self._noise, self._drift
-        )
-        ideal = F.translational().tolist() + F.rotational().tolist()
-        read = [x + e + o for x, e, o in zip(ideal, fault, self._zero, strict=True)]
-        peak_f = max(abs(read[0]), abs(read[1]), abs(read[2]))
-        peak_m = max(abs(read[3]), abs(read[4]), abs(read[5]))
-        lost = any(
-            a <= time < b for a, b in zip(p.lost[::2], p.lost[1::2], strict=True)
-        )
-        if lost or not (peak_f <= p.force_range and peak_m <= p.moment_range):
-            return _SILENCE  # a NaN is not in range either
-        u, du = shaft[3:6], shaft[9:12]
-        turn, spin = cross(A_WM.rotational().tolist(), u), cross(w, du)
-        ddu = [turn[0] + spin[0], turn[1] + spin[1], turn[2] + spin[2]]
-        a_WM = A_WM.translational().tolist()
-        f, m = instrument_wrench(u, ddu, a_WM, self._mass, self._centre, self._inertia)
+        sleeve = np.zeros(7)
         if self._sleeve >= 0:
-            a = accelerations[self._sleeve].translational().tolist()
-            p_WC = self._poses.Eval(context)[self._sleeve].translation().tolist()
-            b = [self._sleeve_mass * x for x in a]
-            moment = cross([p_WC[k] - shaft[k] for k in (0, 1, 2)], b)
-            f = [f[k] + b[k] for k in (0, 1, 2)]
-            m = [m[k] + moment[k] for k in (0, 1, 2)]
-        for k, (x, y, z) in enumerate(R_WM):
-            f[k] -= x * read[0] + y * read[1] + z * read[2]
-            m[k] -= x * read[3] + y * read[4] + z * read[5]
-        return [*f, *m, 1.0]
+            sleeve[0] = self._sleeve_mass
+            sleeve[1:4] = self._poses.Eval(context)[self._sleeve].translation()
+            sleeve[4:7] = accelerations[self._sleeve].translational()
+        return wall_wrench(
+            R_WM,
+            shaft,
+            w,
+            A_WM.rotational(),
+            A_WM.translational(),
+            F.translational(),
+            F.rotational(),
+            sensor_noise.fault(p.seed, max(0, round(time / p.period)), self._faults),
+            self._instrument,
+            self._limit,
+            sleeve,
+        )
 
     def _oldest(self, context: Any) -> Sequence[float]:
         return context.get_discrete_state(self._late).value()[:7]

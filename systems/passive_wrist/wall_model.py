@@ -17,40 +17,22 @@ from collections.abc import Sequence
 from math import sqrt
 
 type Vector = Sequence[float]
+type Triple = tuple[float, float, float]
 
 
-def lateral_basis(u: Vector) -> tuple[list[float], list[float]]:
+def lateral_basis(u: Vector) -> tuple[Triple, Triple]:
     """Two unit vectors e1, e2 = u x e1 across a unit vector u (3)."""
-    x, y, z = u
+    x, y, z = u[0], u[1], u[2]
     if abs(x) < 0.8:  # across the world's x axis, unless u is close to it
         n = sqrt(y * y + z * z)
-        e1 = [0.0, z / n, -y / n]
+        e1 = (0.0, z / n, -y / n)
     else:
         n = sqrt(x * x + z * z)
-        e1 = [-z / n, 0.0, x / n]
+        e1 = (-z / n, 0.0, x / n)
     a, b, c = e1
-    return e1, [y * c - z * b, z * a - x * c, x * b - y * a]
+    return e1, (y * c - z * b, z * a - x * c, x * b - y * a)
 
 
 def dot(a: Vector, b: Vector) -> float:
     """The inner product of two 3-vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def lateral_jacobian(
-    f1: float,
-    f2: float,
-    depth: float,
-    u: Vector,
-    e1: Vector,
-    e2: Vector,
-    stiffness: float,
-) -> list[list[float]]:
-    """Derivative (4, 3) of (f1, f2, m1, m2) by p_I, without the damping's part."""
-    k, kd = stiffness, stiffness * depth
-    return [
-        [k * e1[0], k * e1[1], k * e1[2]],
-        [k * e2[0], k * e2[1], k * e2[2]],
-        [-f2 * u[i] - kd * e2[i] for i in (0, 1, 2)],
-        [f1 * u[i] + kd * e1[i] for i in (0, 1, 2)],
-    ]

@@ -183,11 +183,12 @@ class WristLaw:
         if p.mode == "pwe" and p.probe:
             target, velocity = self._probe(s, i, target, velocity)
         if s[STARTED] == 0.0:
-            s[0:3], s[3:6] = target, velocity
-            s[6:9] = i.p_WP
+            s[0:3], s[3:6], s[6:9] = target, velocity, i.p_WP
             s[STARTED] = 1.0
-        reach, length = dist(i.p_WP, s[0:3]), dist(i.p_WP, i.p_WS)
-        self._move_pivot(s, target, velocity, max(reach / max(length, 1e-3), 0.1))
+        else:
+            reach, length = dist(i.p_WP, s[0:3]), dist(i.p_WP, i.p_WS)
+            ratio = max(reach / max(length, 1e-3), 0.1)
+            self._move_pivot(s, target, velocity, ratio)
         if s[FROZEN] == 0.0:
             # The tip goes back to its task no faster than the wrist may move.
             away = [i.p_WP[k] - s[6 + k] for k in (0, 1, 2)]
