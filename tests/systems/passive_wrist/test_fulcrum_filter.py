@@ -95,7 +95,7 @@ def test_transition_matrix_is_the_slope():
         ({"force_noise": 0.0}, "force_noise=0.0 must be > 0"),
         ({"force_noise": float("nan")}, "force_noise=nan"),
         ({"guess": [0.0, 0.0]}, "3 numbers"),
-        ({"harmonics": 7}, "harmonics=7 must be 1, 2 or 3"),
+        ({"harmonics": 7}, "harmonics=7 must be 1, 2, 3 or 4"),
     ],
 )
 def test_bad_input(change, message):
