@@ -1,5 +1,6 @@
 """One look for all plots."""
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -43,3 +44,11 @@ def save_figure(figure: Figure, path: Path) -> None:
     """Writes a figure as PNG."""
     with rc_context(STYLE):
         figure.savefig(path, dpi=140)
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as PNG, for `IPython.display.Image` in a notebook."""
+    buffer = BytesIO()
+    with rc_context(STYLE):
+        figure.savefig(buffer, dpi=100)
+    return buffer.getvalue()

@@ -1,6 +1,7 @@
 """Running a scenario: build, advance, log; then measure, plot and replay."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 import gc
 import json
@@ -16,12 +17,13 @@ from pydrake.systems.analysis import (
     SimulatorConfig,
 )
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from diagrams.common import metrics, replay
 from diagrams.common.plots import save_figure
 from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
 from diagrams.common.study import Study, build, get_study
+from systems.common.compiled import announced
 from systems.common.stopwatch import STOPWATCH
 
 INTEGRATOR = SimulatorConfig(
@@ -71,6 +73,26 @@ def columns(study: Study, port: str) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
+def rehearse(
+    diagram: Any, context: Any, config: SimulatorConfig, duration: float
+) -> None:
+    """Runs the first instants on a copy of the context, and forgets them.
+
+    The blocks' kernels are compiled at their first call, or loaded from the disk: that
+    is no part of the time that a run takes. An error will come again in the run.
+
+    Args:
+        diagram: The root diagram.
+        context: At the start of the run.
+        config: The run's integrator.
+        duration: How far to go, in s.
+    """
+    simulator = Simulator(diagram, context.Clone())
+    ApplySimulatorConfig(config, simulator)
+    with announced(), suppress(Exception, SystemExit):
+        simulator.AdvanceTo(duration)
+
+
 def simulate(
     scenario: Any,
     meshcat: Any = None,
@@ -91,38 +113,41 @@ def simulate(
         ScenarioError: If the scenario cannot run.
     """
     check_scenario(scenario)
+    return simulate_diagram(scenario, build(scenario), meshcat, progress)
+
+
+def simulate_diagram(
+    scenario: Any,
+    diagram: Any,
+    meshcat: Any = None,
+    progress: Callable[[float], None] = lambda time: None,
+) -> Run:
+    """Runs a diagram of one's own making, for example with swapped blocks.
+
+    Args:
+        scenario: The scenario that it was made for.
+        diagram: Exports the ports that the scenario's study logs.
+        meshcat: As for `simulate`.
+        progress: As for `simulate`.
+    """
     study = get_study(scenario.system)
     builder = DiagramBuilder()
-    station = builder.AddNamedSystem("station", build(scenario))
-    sinks = {
-        port: LogVectorOutput(station.GetOutputPort(port), builder, study.log_period)
-        for port in study.signals
-        if port not in study.optional or station.HasOutputPort(port)
-    }
-    for port, sink in sinks.items():
-        sink.set_name(f"log({port})")
+    station = builder.AddNamedSystem("station", diagram)
+    ports = logged_ports(station, study)
+    sink = add_log(builder, station, ports, study.log_period)
     recorder = replay.add_recorder(builder, station, meshcat, study)
-    diagram = builder.Build()
-    simulator = Simulator(diagram)
-    ApplySimulatorConfig(INTEGRATOR, simulator)
+    root = builder.Build()
+    simulator = Simulator(root)
+    config = study.integrator(scenario) or INTEGRATOR
+    ApplySimulatorConfig(config, simulator)
     context = simulator.get_mutable_context()
-    diagram.SetRandomContext(context, RandomGenerator(scenario.seed))
-    run = Run(scenario, study, diagram)
+    root.SetRandomContext(context, RandomGenerator(scenario.seed))
+    run = Run(scenario, study, root)
+    rehearse(root, context, config, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
-        simulator.Initialize()
-        recorder.draw(context)
-        for frame in range(1, int(scenario.duration * study.frame_rate) + 2):
-            time = min(frame / study.frame_rate, scenario.duration)
-            study.adjust(scenario, station, context)
-            start = perf_counter()
-            simulator.AdvanceTo(time)
-            run.wall_time += perf_counter() - start
-            recorder.draw(context)
-            progress(time)
-            if time == scenario.duration:
-                break
+        advance(run, simulator, recorder, progress)
     except KeyboardInterrupt:
         run.error = "interrupted"
     except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
@@ -130,20 +155,73 @@ def simulate(
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    for port, sink in sinks.items():
-        log = sink.FindLog(context)
-        run.signals.setdefault("time", log.sample_times().copy())
-        names = columns(study, port)
-        for name, row in zip(names, log.data(), strict=True):
-            run.signals[name] = row.copy()
-    shortest = min(len(column) for column in run.signals.values())
-    run.signals = {name: column[:shortest] for name, column in run.signals.items()}
+    run.signals = read_log(sink, study, ports, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
-    if shortest > 1:
+    if len(run.signals["time"]) > 1:
         run.metrics = metrics.common(run) | study.measure(run)
     recorder.finish(run)
     return run
+
+
+def advance(
+    run: Run,
+    simulator: Any,
+    recorder: replay.Recorder,
+    progress: Callable[[float], None],
+) -> None:
+    """Steps the simulator from frame to frame; only the steps are timed."""
+    duration, period = run.scenario.duration, 1.0 / run.study.frame_rate
+    simulator.Initialize()
+    recorder.draw(simulator.get_context())
+    station = run.diagram.GetSubsystemByName("station")
+    time, frame = 0.0, 0
+    while time < duration:
+        frame += 1
+        time = min(frame * period, duration)
+        run.study.adjust(run.scenario, station, simulator.get_mutable_context())
+        start = perf_counter()
+        simulator.AdvanceTo(time)
+        run.wall_time += perf_counter() - start
+        recorder.draw(simulator.get_context())
+        progress(time)
+
+
+def logged_ports(station: Any, study: Study) -> list[str]:
+    """The study's signals, without the optional ones that this diagram lacks."""
+    return [
+        name
+        for name in study.signals
+        if name not in study.optional or station.HasOutputPort(name)
+    ]
+
+
+def add_log(builder: Any, station: Any, names: list[str], period: float) -> Any:
+    """Logs signals of a diagram, one below the other, in one sink.
+
+    One sink for all: each system of a diagram costs time at each of its steps.
+    """
+    ports = [station.GetOutputPort(name) for name in names]
+    bundle = builder.AddNamedSystem(
+        "signals", Multiplexer([port.size() for port in ports])
+    )
+    for index, port in enumerate(ports):
+        builder.Connect(port, bundle.get_input_port(index))
+    sink = LogVectorOutput(bundle.get_output_port(), builder, period)
+    sink.set_name("log")
+    return sink
+
+
+def read_log(
+    sink: Any, study: Study, ports: list[str], context: Any
+) -> dict[str, np.ndarray]:
+    """All columns of the log; "time" is the first."""
+    log = sink.FindLog(context)
+    names = [name for port in ports for name in columns(study, port)]
+    signals = {"time": log.sample_times().copy()}
+    for name, row in zip(names, log.data(), strict=True):
+        signals[name] = row.copy()
+    return signals
 
 
 def prepare_folder(out: Path) -> None:

@@ -10,6 +10,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 STUDIES = {
     "gauze": "diagrams.gauze.study",
     "wrist": "diagrams.wrist.study",
+    "snake": "diagrams.resection.snake_study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
 
@@ -43,6 +44,8 @@ class Study:
         controller: Name of the block whose updates mark a whole control instant
             for `planner_step_median`; empty if there is none.
         required: Dotted keys that a scenario's file must have.
+        integrator: Makes the SimulatorConfig of a scenario; None for that of all
+            continuous plants (`diagrams.common.run.INTEGRATOR`).
         view: The replay's camera.
         adjust: Called with scenario, diagram and root context before every frame,
             for parameters of the plant that change with time.
@@ -62,6 +65,7 @@ class Study:
     optional: frozenset[str] = frozenset()
     adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
     required: tuple[str, ...] = ("system", "duration")
+    integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)
     frame_rate: float = 30.0
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 import math
 
+import numpy as np
+
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
@@ -19,6 +21,7 @@ from systems.auto_guidance.surgeon_tool import SurgeonToolParams
 from systems.auto_guidance.tool_navigation import (
     ToolNavigationParams,
     cone_angle,
+    constants,
     reachable,
 )
 from systems.auto_guidance.trajectory_estimator import TrajectoryEstimatorParams
@@ -127,12 +130,13 @@ def _check_fulcrums(scenario: GauzeScenario) -> None:
 def _check_reach(scenario: GauzeScenario) -> None:
     """The start and S's first tip must be reachable and in view."""
     limits = scenario.navigation
+    record = constants(limits)[0]
     p_WG = scenario.robot.p_WG
     for name, point in (
         ("robot.p_WP", scenario.robot.p_WP),
         ("target.points[0]", scenario.target.points[0]),
     ):
-        if not reachable(limits, p_WG, point):
+        if not reachable(record, tuple(p_WG), tuple(point)):
             raise ScenarioError(
                 f"{name}={point} is out of reach through robot.p_WG="
                 f"{scenario.robot.p_WG}: expected an insertion in "
@@ -143,8 +147,9 @@ def _check_reach(scenario: GauzeScenario) -> None:
     start = scenario.target.points[0]
     axis = [p - a for p, a in zip(scenario.camera.p_WS, apex, strict=True)]
     length = math.hypot(*axis)
-    cone = [*apex, *(x / length for x in axis), scenario.camera.half_angle]
-    if cone_angle(cone, start) > scenario.camera.half_angle:
+    half_angle = scenario.camera.half_angle
+    cone = np.array([*apex, *(x / length for x in axis), half_angle])
+    if cone_angle(cone, tuple(start)) > scenario.camera.half_angle:
         raise ScenarioError(
             f"target.points[0]={start} lies outside the view cone of half angle "
             f"{scenario.camera.half_angle} rad about camera.p_WS={scenario.camera.p_WS}"

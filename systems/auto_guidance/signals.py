@@ -7,9 +7,8 @@ sigma_p, sigma_v, sigma_a, known (1 or 0), age of the last valid frame.
 World frame, SI units.
 """
 
-from collections.abc import Sequence
-
-from systems.common.geometry import all_finite
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, all_finite, xyz
 
 ROBOT_TOOL_EXAMPLE = [0.0, 0.0, 0.0, 0.02, 0.0, -0.12]
 """A robot's instrument, 0.12 m inside."""
@@ -41,21 +40,25 @@ GUIDE_EXAMPLE = [
 """A guide point 0.03 m from the obstacle tool."""
 
 
-def velocity(estimate: Sequence[float]) -> Sequence[float]:
+@compiled
+def velocity(estimate: Numbers) -> Vector:
     """v_WP of an estimate, m/s."""
-    return estimate[3:6]
+    return xyz(estimate, 3)
 
 
-def acceleration(estimate: Sequence[float]) -> Sequence[float]:
+@compiled
+def acceleration(estimate: Numbers) -> Vector:
     """a_WP of an estimate, m/s^2."""
-    return estimate[6:9]
+    return xyz(estimate, 6)
 
 
-def fulcrum(estimate: Sequence[float]) -> Sequence[float]:
+@compiled
+def fulcrum(estimate: Numbers) -> Vector:
     """p_WG of an estimate, m."""
-    return estimate[9:12]
+    return xyz(estimate, 9)
 
 
-def usable(estimate: Sequence[float]) -> bool:
-    """True if the estimator knows the tool and gives numbers for its motion."""
-    return estimate[15] > 0.5 and all_finite(estimate[0:12])
+@compiled
+def usable(estimate: Numbers) -> bool:
+    """True if the estimator knows the tool and gives numbers only."""
+    return estimate[15] > 0.5 and all_finite(estimate)

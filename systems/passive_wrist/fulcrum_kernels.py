@@ -11,17 +11,17 @@ number of readings that f and m are the mean of, and the weight of its angle.
 from functools import lru_cache
 from math import cos, exp, sin, sqrt
 
-from numba import njit
 import numpy as np
 
+from systems.common.compiled import compiled
 from systems.passive_wrist.wall_model import lateral_basis
 
-_basis = njit(lateral_basis)
+_basis = compiled(lateral_basis)
 
 Floats = np.ndarray
 
 
-@njit(cache=True)
+@compiled
 def predict(
     x: Floats, P: Floats, dt: float, walk: float, parts: Floats, breathing: bool
 ) -> None:
@@ -49,7 +49,7 @@ def predict(
     P[n - 1, n - 1] += 1e-4 * dt
 
 
-@njit(cache=True)
+@compiled
 def lateral_slope(
     f1: float, f2: float, depth: float, u: Floats, e1: Floats, e2: Floats, k: float
 ) -> Floats:
@@ -63,7 +63,7 @@ def lateral_slope(
     return J
 
 
-@njit(cache=True)
+@compiled
 def innovate(x: Floats, P: Floats, a: Floats, noise: Floats, depth_above: float):  # type: ignore[no-untyped-def]
     """Compares a sample with the state.
 
@@ -126,7 +126,7 @@ def innovate(x: Floats, P: Floats, a: Floats, noise: Floats, depth_above: float)
     return y, H, S, HP, b[:, :n].T.copy(), w, nis if sound else -1.0, seen
 
 
-@njit(cache=True)
+@compiled
 def _solve(S: Floats, b: Floats) -> bool:
     """S^-1 b in place by Cholesky; False if S is not positive definite."""
     for i in range(4):
@@ -151,7 +151,7 @@ def _solve(S: Floats, b: Floats) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def update(
     x: Floats,
     P: Floats,
@@ -183,7 +183,7 @@ def update(
             P[i, j] = P[j, i] = value
 
 
-@njit(cache=True)
+@compiled
 def add_to_record(sums: Floats, x: Floats, a: Floats, w: Floats) -> None:
     """Adds a sample to the sums of a record's entry, the damping's part taken out.
 
@@ -209,7 +209,7 @@ def add_to_record(sums: Floats, x: Floats, a: Floats, w: Floats) -> None:
     sums[12] += a[20]
 
 
-@njit(cache=True)
+@compiled
 def sample_of(entry: Floats, averaged: int) -> Floats:
     """A record's entry as a sample."""
     a = np.zeros(21)
@@ -220,7 +220,7 @@ def sample_of(entry: Floats, averaged: int) -> Floats:
     return a
 
 
-@njit(cache=True)
+@compiled
 def filter_record(
     x: Floats,
     P: Floats,
@@ -243,7 +243,7 @@ def filter_record(
     return True
 
 
-@njit(cache=True)
+@compiled
 def spread(P: Floats, u: Floats, bias: float) -> tuple[float, float]:
     """Standard deviations of the fulcrum across the shaft and along it, in m.
 

@@ -2,14 +2,15 @@
 
 from math import isfinite
 
-from numba import njit
 import numpy as np
+
+from systems.common.compiled import compiled
 
 Floats = np.ndarray
 _GRAVITY = 9.81
 
 
-@njit(cache=True)
+@compiled
 def _cross(a: Floats, b: Floats) -> Floats:
     c = np.empty(3)
     c[0] = a[1] * b[2] - a[2] * b[1]
@@ -18,7 +19,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return c
 
 
-@njit(cache=True)
+@compiled
 def shaft_of(R_WM: Floats, p_WM: Floats, v_WM: Floats, w_WM: Floats) -> Floats:
     """p_WS, u, v_WS, du/dt (12) of a mount M whose z axis is the shaft."""
     shaft = np.empty(12)
@@ -29,7 +30,7 @@ def shaft_of(R_WM: Floats, p_WM: Floats, v_WM: Floats, w_WM: Floats) -> Floats:
     return shaft
 
 
-@njit(cache=True)
+@compiled
 def wall_wrench(
     R_WM: Floats,
     shaft: Floats,

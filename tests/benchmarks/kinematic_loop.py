@@ -10,21 +10,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from systems.auto_guidance.backward_movement import (
-    BackwardMovementParams,
+import numpy as np
+
+from systems.auto_guidance import (
     backward_movement,
+    fuzzy_arbiter,
+    go_to_target,
+    velocity_corrections,
 )
-from systems.auto_guidance.fuzzy_arbiter import (
-    Decision,
-    FuzzyArbiterParams,
-    arbitrate,
-)
-from systems.auto_guidance.go_to_target import GoToTargetParams, go_to_target
-from systems.auto_guidance.velocity_corrections import (
-    SpeedScale,
-    VelocityCorrectionsParams,
-    velocity_correction,
-)
+from systems.auto_guidance.backward_movement import BackwardMovementParams
+from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
+from systems.auto_guidance.go_to_target import GoToTargetParams
+from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
 from systems.common.geometry import (
     Vector,
     along,
@@ -85,8 +82,10 @@ class LocalPlanner:
 
     def __post_init__(self) -> None:
         """Starts from rest."""
-        self._scale = SpeedScale(self.corrections)
-        self._decision = Decision(self.arbiter)
+        self._go = go_to_target.constants(self.go)[0]
+        self._corrections = velocity_corrections.constants(self.corrections)[0]
+        self._backward = backward_movement.constants(self.backward)[0]
+        self._arbiter = fuzzy_arbiter.constants(self.arbiter)[0]
         self._v1_tip: Vector = (0.0, 0.0, 0.0)
         self._v_tip: Vector = (0.0, 0.0, 0.0)
         self.v3: Vector = (0.0, 0.0, 0.0)
@@ -99,22 +98,25 @@ class LocalPlanner:
         target: Sequence[float],
     ) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
-        self._v1_tip, self.guide = go_to_target(
-            self.go, self._v1_tip, dt, robot_tool, obstacle, target
+        robot_tool = np.asarray(robot_tool, float)
+        self._v1_tip, guide = go_to_target.go_to_target(
+            self._go, self._v1_tip, dt, robot_tool, obstacle, target
         )
+        self.guide = np.array(guide)
         zero = (0.0, 0.0, 0.0)
         s = self.guide[7]
         self.v1 = along(zero, s, self._v1_tip)
         if self.field_only:
             self.v2, self.v_R, self.weights = zero, self.v1, [1.0, 0.0, 0.0]
             return self._v1_tip
-        self.v2 = velocity_correction(
-            self.corrections, self._scale, self.v1, self.guide, obstacle
+        self.v2 = velocity_corrections.velocity_correction(
+            self._corrections, self.v1, self.guide, obstacle
         )
-        self.v3 = backward_movement(self.backward, self.v3, dt, self.guide, obstacle)
-        self.weights, self._v_tip, _ = arbitrate(
-            self.arbiter,
-            self._decision,
+        self.v3 = backward_movement.backward_movement(
+            self._backward, self.v3, dt, self.guide, obstacle
+        )
+        self.weights, self._v_tip, _ = fuzzy_arbiter.arbitrate(
+            self._arbiter,
             self._v_tip,
             dt,
             (self.v1, self.v2, self.v3),
@@ -132,9 +134,9 @@ def estimate(
     fulcrum: Sequence[float],
     v: Sequence[float] = (0.0, 0.0, 0.0),
     a: Sequence[float] = (0.0, 0.0, 0.0),
-) -> list[float]:
+) -> np.ndarray:
     """An exact estimate (17) of a tool."""
-    return [*p, *v, *a, *fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0]
+    return np.array([*p, *v, *a, *fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)

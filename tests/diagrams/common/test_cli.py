@@ -74,7 +74,7 @@ def test_set_changes_what_runs(tmp_path):
             "out of reach",
         ),
         (
-            ["run", "gauze_static", "--set", "camera.p_WS=[-0.06, -0.06, -0.1]"],
+            ["run", "gauze_static", "--set", "camera.p_WS=[0.2, 0.2, -0.1]"],
             "outside the view cone",
         ),
         (["run", "gauze_static", "--set", "recording=nowhere.csv"], "nowhere.csv"),
@@ -125,14 +125,14 @@ def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     from diagrams.common.scenario import load_scenario
     from systems.auto_guidance.endoscope import Endoscope
 
-    follow = Endoscope._follow
+    follow = Endoscope._update
 
     def broken(self, context):
         if context.get_time() > 0.3:
             raise RuntimeError("the camera fell off")
         return follow(self, context)
 
-    monkeypatch.setattr(Endoscope, "_follow", broken)
+    monkeypatch.setattr(Endoscope, "_update", broken)
     scenario = load_scenario("gauze_static", duration=1.0)
     run = run_scenario(scenario, tmp_path, with_replay=False)
     assert "the camera fell off" in run.error
