@@ -130,7 +130,7 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         )
         for tool in (target, obstacle)
     ]
-    return {
+    blocks = {
         "target_tool": SurgeonTool(target),
         "obstacle_tool": SurgeonTool(obstacle),
         "optical_tracker": OpticalTracker(s.tracker),
@@ -148,6 +148,9 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
+    if not s.emulated:
+        blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
+    return blocks
 
 
 def make_gauze_diagram(
@@ -178,8 +181,6 @@ def make_gauze_diagram(
         connect(builder, systems, EMULATED)
         export(builder, systems, EXPORTS | WRIST_EXPORTS)
     else:
-        source = ConstantVectorSource(scenario.robot.p_WG)
-        systems["fulcrum"] = builder.AddNamedSystem("fulcrum", source)
         connect(builder, systems, WIRES)
         export(builder, systems, EXPORTS)
     diagram = builder.Build()

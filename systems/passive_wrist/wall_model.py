@@ -16,7 +16,9 @@ Everything here is in plain floats: it runs at every control step.
 from collections.abc import Sequence
 from math import sqrt
 
-type Vector = Sequence[float]
+import numpy as np
+
+type Vector = Sequence[float] | np.ndarray
 type Triple = tuple[float, float, float]
 
 
