@@ -46,6 +46,8 @@ class FulcrumParams:
             1/sqrt(s).
         axial_ratio: Prior of the unseen axial breathing over the lateral one.
         neighbourhood: The fulcrum is never farther from the guess, in m.
+        latency: How old force and pose are when they arrive, in s; the estimate is
+            predicted over it.
         period: Of the updates, in s.
     """
 
@@ -69,6 +71,7 @@ class FulcrumParams:
     amplitude_walk: float = 0.03
     axial_ratio: float = 2.0
     neighbourhood: float = 0.08
+    latency: float = 0.0
     period: float = 1.0 / 120.0
 
     def check(self) -> None:
@@ -93,7 +96,7 @@ class FulcrumParams:
                 raise ValueError(
                     f"fulcrum estimator: {name}={getattr(self, name)} must be > 0"
                 )
-        for name in ("damping", "force_bias", "moment_bias", "pose_noise"):
+        for name in ("damping", "force_bias", "moment_bias", "pose_noise", "latency"):
             if not 0.0 <= getattr(self, name) < float("inf"):
                 raise ValueError(
                     f"fulcrum estimator: {name}={getattr(self, name)} must be >= 0"

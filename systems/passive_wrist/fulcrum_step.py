@@ -117,7 +117,7 @@ def report(packed: Floats, z: Floats, u: Floats, time: float) -> Floats:
     aux = z[i_record + (RECORD + 1) * WIDTH :]
     x, P = z[:n], z[n:i_record].reshape(n, n)
     omega, K = exp(x[n - 2]), exp(x[n - 1])
-    ahead = max(0.0, time - aux[_TIME])
+    ahead = max(0.0, time - aux[_TIME]) + c.latency
     r = np.empty(14)
     for j in range(3):
         r[j], r[3 + j] = x[j], 0.0

@@ -46,6 +46,7 @@ class Case:
     phase: float
     seed: int
     delay: int = 0
+    frequency: float = 120.0
 
 
 def sweep(seed: int) -> list[Case]:
@@ -79,6 +80,33 @@ def monte_carlo(seed: int, count: int) -> list[Case]:
     return cases
 
 
+def margins(seed: int) -> list[Case]:
+    """Control rates, and sensors that are late against the pose, in samples."""
+    return [
+        Case(k, 0.005, 0.2, 0.01, "ventilator", 0.2, seed, delay, frequency)
+        for k in (100.0, 500.0, 3000.0)
+        for frequency in (60.0, 120.0, 240.0)
+        for delay in ((0, 1, 2, 4) if frequency == 120.0 else (0,))
+    ]
+
+
+def margin_plot(rows: list[dict[str, object]], path: Path) -> None:
+    """Force against control rate and against delay, as a picture."""
+    figure = new_figure(8.0, 3.0)
+    left, right = add_axes(figure, 1, 2, 1), add_axes(figure, 1, 2, 2)
+    for stiffness in (100.0, 500.0, 3000.0):
+        here = [row for row in rows if row["stiffness"] == stiffness]
+        prompt = [row for row in here if row["delay"] == 0]
+        late = [row for row in here if row["frequency"] == 120.0]
+        force, label = "rms_lateral_force", f"{stiffness:.0f} N/m"
+        left.plot(column(prompt, "frequency"), column(prompt, force), "o-", label=label)
+        right.plot(column(late, "delay") / 0.12, column(late, force), "o-", label=label)
+    left.set(xlabel="control rate [Hz]", ylabel="rms force [N]", ylim=(0, None))
+    right.set(xlabel="force late by [ms], at 120 Hz", ylim=(0, None))
+    right.legend(frameon=False)
+    save_figure(figure, path)
+
+
 def scenario(case: Case, duration: float = DURATION) -> WristScenario:
     """The wrist study of a case: amplitude 1.5 times as large along the shaft."""
     a, e = case.amplitude, case.first_error
@@ -100,6 +128,13 @@ def scenario(case: Case, duration: float = DURATION) -> WristScenario:
     result.robot.p_WP = [0.0, 0.0, -0.15]
     result.abdomen.stiffness = case.stiffness
     result.tool_wrench.delay = case.delay
+    for part in (
+        result.joints,
+        result.tool_wrench,
+        result.fulcrum_estimator,
+        result.passive_wrist,
+    ):
+        part.period = 1.0 / case.frequency
     return result
 
 
@@ -209,6 +244,10 @@ def main(argv: list[str] | None = None) -> int:
     save(rows, arguments.out / "wrist_sweep.csv")
     heat_map(rows, arguments.out / "wrist_sweep.png")
     report(rows, "sweep")
+    margin = run_all(margins(arguments.seed), arguments.jobs)
+    save(margin, arguments.out / "wrist_margins.csv")
+    margin_plot(margin, arguments.out / "wrist_margins.png")
+    report(margin, "rates and delays")
     if arguments.monte_carlo:
         random = run_all(
             monte_carlo(arguments.seed, arguments.monte_carlo), arguments.jobs
