@@ -9,6 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from systems.auto_guidance.backward_movement import BackwardMovement
@@ -65,7 +66,21 @@ WIRES = (
     ("obstacle_tool.shaft", "posed_tools.O"),
     ("endoscope.shaft", "posed_tools.C"),
 )
-"""Every signal of the diagram but the plant's own."""
+"""Every signal of the diagram but the plant's own, the fulcrum known."""
+
+TOLD = (
+    ("fulcrum.y0", "robot_location.fulcrum"),
+    ("tool_navigation.tool", "joint_commands.tool"),
+)
+"""The wires that the passive wrist takes the place of."""
+
+EMULATED = (
+    *WRIST_WIRES,
+    ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("tool_navigation.tool", "passive_wrist.tool_wanted"),
+    ("passive_wrist.permission", "tool_navigation.permission"),
+)
+"""Figure 2's passive wrist emulation between the local planner and the arm."""
 
 EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
@@ -115,7 +130,7 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         )
         for tool in (target, obstacle)
     ]
-    return {
+    blocks = {
         "target_tool": SurgeonTool(target),
         "obstacle_tool": SurgeonTool(obstacle),
         "optical_tracker": OpticalTracker(s.tracker),
@@ -125,7 +140,6 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "target_estimator": TrajectoryEstimator(estimators[0]),
         "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
-        "fulcrum": ConstantVectorSource(s.robot.p_WG),
         "robot_location": RobotLocation(s.instrument),
         "go_to_target": GoToTarget(s.go_to_target),
         "velocity_corrections": VelocityCorrections(s.velocity_corrections),
@@ -134,6 +148,9 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
+    if not s.emulated:
+        blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
+    return blocks
 
 
 def make_gauze_diagram(
@@ -158,8 +175,14 @@ def make_gauze_diagram(
     for name, block in blocks.items():
         builder.AddNamedSystem(name, block)
     systems = theatre.systems | blocks
-    connect(builder, systems, WIRES)
-    export(builder, systems, EXPORTS)
+    if scenario.emulated:
+        systems |= add_wrist(builder, theatre, scenario)
+        connect(builder, systems, [w for w in WIRES if w not in TOLD])
+        connect(builder, systems, EMULATED)
+        export(builder, systems, EXPORTS | WRIST_EXPORTS)
+    else:
+        connect(builder, systems, WIRES)
+        export(builder, systems, EXPORTS)
     diagram = builder.Build()
     diagram.set_name("gauze_delivery")
     return diagram

@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
@@ -41,7 +42,7 @@ class RobotTool:
 
 
 @dataclass
-class GauzeScenario(Scenario):
+class GauzeScenario(Scenario, WristSettings):
     """Auto-guided movements (section 5 of the paper): gauze to the surgeon.
 
     Attributes:
@@ -49,10 +50,12 @@ class GauzeScenario(Scenario):
             place of O's waypoints.
         known_fulcrums: Whether the estimators are told G_S and G_O, for
             comparison; else they find them from the shafts' lines.
+        measure_from: Force figures of the wrist start here [s].
     """
 
     recording: str = field(default="", metadata={"file": True})
     known_fulcrums: bool = False
+    measure_from: float = 0.0
     robot: RobotTool = field(default_factory=RobotTool)
     target: SurgeonToolParams = field(default_factory=SurgeonToolParams)
     obstacle: SurgeonToolParams = field(default_factory=SurgeonToolParams)
@@ -75,6 +78,11 @@ class GauzeScenario(Scenario):
     instrument: InstrumentParams = field(default_factory=InstrumentParams)
     abdomen: AbdomenParams = field(default_factory=AbdomenParams)
 
+    @property
+    def emulated(self) -> bool:
+        """Whether the passive wrist is in the diagram: its fulcrum is not given."""
+        return self.wrist != "known" or not self.wall_motion.still
+
 
 LEAST_FULCRUM_DISTANCE = 0.02
 """Two trocars cannot be closer [m]."""
@@ -85,6 +93,7 @@ def check(scenario: GauzeScenario) -> None:
     for part in vars(scenario).values():
         if hasattr(part, "check"):
             part.check()
+    check_wrist(scenario)
     if scenario.recording:
         load_recording(scenario.recording)
     points = {
