@@ -7,6 +7,8 @@ BENCHMARKS = {
     "speed": "tests.benchmarks.gauze_speed",
     "scenes": "tests.benchmarks.kinematic_scenes",
     "snake": "tests.benchmarks.snake_speed",
+    "wrist_step": "tests.benchmarks.wrist_step",
+    "wrist": "tests.benchmarks.wrist_sweep",
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 
