@@ -37,6 +37,7 @@ _JUMP_NIS = 30.0  # normalised innovation squared of a jump
 _GUARD_TIME = 0.1  # s after a jump in which only the mean is updated
 _GUARD_WALK = 0.05  # m/sqrt(s): the rest of a jump that takes more than two samples
 _LARGEST_JUMP = 0.02  # [m]
+_UNDERSTOOD = 4.0  # times the force above which the stiffness is learnt
 _DEPTH_UNKNOWN = 6e-3  # [m] sigma along the shaft
 
 
@@ -205,7 +206,10 @@ def advance(
     else:
         aux[_UNLIKELY] = 0.0
         aux[_NIS] += 0.02 * (min(nis, 60.0) / 4.0 - aux[_NIS])
-        held = 3 if guard else (n if force > c.learn_above else n - 1)
+        # Once the wall is understood, force is mostly what the prediction missed of
+        # its motion, and says less of its stiffness.
+        least = c.learn_above * (_UNDERSTOOD if known else 1.0)
+        held = 3 if guard else (n if force > least else n - 1)
         update(x, P, y, S, HP, gain, u, max(seen, a[20]), held)
     add_to_record(sums, x, a, w)
     aux[_SUMMED] += 1.0

@@ -245,6 +245,8 @@ def believable(fit: BreathingFit, entries: int, noise: float) -> bool:
     clear = 2.5 if entries == RECORD else 4.0
     if fit.amplitude < max(2e-4, 3.0 * noise, clear * fit.residual):
         return False
+    if len(fit.parts) > 1 and fit.parts[1] > 0.8 * fit.parts[0]:
+        return False  # half the rate: of a breath the first harmonic is the largest
     breaths = fit.rate * entries * _RECORD_PERIOD
     # A sharp wave seen for less than a breath fits a quicker one nearly as well.
     return breaths > 1.3 or fit.residual < 0.04 * fit.amplitude + 1.5 * noise

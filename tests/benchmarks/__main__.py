@@ -8,6 +8,8 @@ BENCHMARKS = {
     "scenes": "tests.benchmarks.kinematic_scenes",
     "snake": "tests.benchmarks.snake_speed",
     "switching": "tests.benchmarks.switching_suite",
+    "wrist_step": "tests.benchmarks.wrist_step",
+    "wrist": "tests.benchmarks.wrist_sweep",
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 
