@@ -65,8 +65,8 @@ from systems.common.projection import greatest_rate, nearest_velocity
 
 _PARALLEL = 0.2
 """Sine of the angle below which a tip's own distance is constrained as well."""
-_INSIDE = 0.97
-"""s below which M_R counts as inside the shaft."""
+_OUTWARDS = 0.05
+"""Share of insertion in A above which retracting would bring R nearer to the tool."""
 _ROWS = 14
 TOOLS = 3
 """Most obstacle tools: O, S, endoscope."""
@@ -209,11 +209,12 @@ def must_dodge(
     rho: float,
     safe: float,
     s: float,
+    outwards: float,
     closing: float,
     evasion: float,
 ) -> bool:
     """Whether R retracts from a tool that sweeps the inside of its shaft."""
-    if s >= _INSIDE or closing <= (0.4 if is_dodging else 0.6) * evasion:
+    if outwards > _OUTWARDS or closing <= (0.4 if is_dodging else 0.6) * evasion:
         return False
     left = max(0.0, rho - safe) / max(closing, 1e-6)
     needed = (q - (s * q - safe)) / params.max_speed
@@ -266,7 +267,7 @@ def constrain(
             if closing > evasion:
                 status[2] = 0.0
         if params.dodge and must_dodge(
-            params, dodging[i] > 0.5, q, rho, safe, s, closing, evasion
+            params, dodging[i] > 0.5, q, rho, safe, s, dot(row, u), closing, evasion
         ):
             dodges[i] = status[3] = 1.0
         rows[last, 0], rows[last, 1], rows[last, 2] = row
