@@ -17,12 +17,13 @@ from pydrake.systems.analysis import (
     SimulatorConfig,
 )
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from diagrams.common import metrics, replay
 from diagrams.common.plots import save_figure
 from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
 from diagrams.common.study import Study, build, get_study
+from systems.common.compiled import announced
 from systems.common.stopwatch import STOPWATCH
 
 INTEGRATOR = SimulatorConfig(
@@ -72,15 +73,23 @@ def columns(study: Study, port: str) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
-def rehearse(diagram: Any, context: Any, duration: float) -> None:
+def rehearse(
+    diagram: Any, context: Any, config: SimulatorConfig, duration: float
+) -> None:
     """Runs the first instants on a copy of the context, and forgets them.
 
     The blocks' kernels are compiled at their first call, or loaded from the disk: that
     is no part of the time that a run takes. An error will come again in the run.
+
+    Args:
+        diagram: The root diagram.
+        context: At the start of the run.
+        config: The run's integrator.
+        duration: How far to go, in s.
     """
     simulator = Simulator(diagram, context.Clone())
-    ApplySimulatorConfig(INTEGRATOR, simulator)
-    with suppress(Exception, SystemExit):
+    ApplySimulatorConfig(config, simulator)
+    with announced(), suppress(Exception, SystemExit):
         simulator.AdvanceTo(duration)
 
 
@@ -124,15 +133,16 @@ def simulate_diagram(
     study = get_study(scenario.system)
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
-    sinks = add_logs(builder, station, study)
+    sink = add_log(builder, station, study)
     recorder = replay.add_recorder(builder, station, meshcat, study)
     root = builder.Build()
     simulator = Simulator(root)
-    ApplySimulatorConfig(INTEGRATOR, simulator)
+    config = study.integrator(scenario) or INTEGRATOR
+    ApplySimulatorConfig(config, simulator)
     context = simulator.get_mutable_context()
     root.SetRandomContext(context, RandomGenerator(scenario.seed))
     run = Run(scenario, study, root)
-    rehearse(root, context, 1.5 * study.log_period)
+    rehearse(root, context, config, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
@@ -144,7 +154,7 @@ def simulate_diagram(
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    run.signals = read_logs(sinks, study, context)
+    run.signals = read_log(sink, study, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
     if len(run.signals["time"]) > 1:
@@ -160,13 +170,13 @@ def advance(
     progress: Callable[[float], None],
 ) -> None:
     """Steps the simulator from frame to frame; only the steps are timed."""
-    duration, rate = run.scenario.duration, run.study.frame_rate
+    duration, period = run.scenario.duration, 1.0 / run.study.frame_rate
     simulator.Initialize()
     recorder.draw(simulator.get_context())
     time, frame = 0.0, 0
     while time < duration:
         frame += 1
-        time = min(frame / rate, duration)
+        time = min(frame * period, duration)
         start = perf_counter()
         simulator.AdvanceTo(time)
         run.wall_time += perf_counter() - start
@@ -174,28 +184,30 @@ def advance(
         progress(time)
 
 
-def add_logs(builder: Any, station: Any, study: Study) -> dict[str, Any]:
-    """Logs the study's signals: port name to log sink."""
-    sinks = {}
-    for port in study.signals:
-        output = station.GetOutputPort(port)
-        sinks[port] = LogVectorOutput(output, builder, study.log_period)
-        sinks[port].set_name(f"log({port})")
-    return sinks
+def add_log(builder: Any, station: Any, study: Study) -> Any:
+    """Logs the study's signals, one below the other, in one sink.
+
+    One sink for all: each system of a diagram costs time at each of its steps.
+    """
+    ports = [station.GetOutputPort(name) for name in study.signals]
+    bundle = builder.AddNamedSystem(
+        "signals", Multiplexer([port.size() for port in ports])
+    )
+    for index, port in enumerate(ports):
+        builder.Connect(port, bundle.get_input_port(index))
+    sink = LogVectorOutput(bundle.get_output_port(), builder, study.log_period)
+    sink.set_name("log")
+    return sink
 
 
-def read_logs(
-    sinks: dict[str, Any], study: Study, context: Any
-) -> dict[str, np.ndarray]:
-    """All columns of the log, of one length; "time" is the first."""
-    signals: dict[str, np.ndarray] = {}
-    for port, sink in sinks.items():
-        log = sink.FindLog(context)
-        signals.setdefault("time", log.sample_times().copy())
-        for name, row in zip(columns(study, port), log.data(), strict=True):
-            signals[name] = row.copy()
-    shortest = min(len(column) for column in signals.values())
-    return {name: column[:shortest] for name, column in signals.items()}
+def read_log(sink: Any, study: Study, context: Any) -> dict[str, np.ndarray]:
+    """All columns of the log; "time" is the first."""
+    log = sink.FindLog(context)
+    names = [name for port in study.signals for name in columns(study, port)]
+    signals = {"time": log.sample_times().copy()}
+    for name, row in zip(names, log.data(), strict=True):
+        signals[name] = row.copy()
+    return signals
 
 
 def prepare_folder(out: Path) -> None:

@@ -9,6 +9,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 
 STUDIES = {
     "gauze": "diagrams.gauze.study",
+    "snake": "diagrams.resection.snake_study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
 
@@ -41,6 +42,8 @@ class Study:
         controller: Name of the block whose updates mark a whole control instant
             for `planner_step_median`; empty if there is none.
         required: Dotted keys that a scenario's file must have.
+        integrator: Makes the SimulatorConfig of a scenario; None for that of all
+            continuous plants (`diagrams.common.run.INTEGRATOR`).
         view: The replay's camera.
         frame_rate: Frames of the replay per simulated second [1/s].
     """
@@ -56,6 +59,7 @@ class Study:
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
     required: tuple[str, ...] = ("system", "duration")
+    integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)
     frame_rate: float = 30.0
 

@@ -125,7 +125,8 @@ def virtual_force(run: Any) -> Figure:
     p_WS = run.matrix("target.shaft")[index, :3] * MM
     p_WGO = _fulcrum(run, "obstacle") * MM
     M_R, M_O = map(
-        np.array, closest_points(*(x.tolist() for x in (p_WG, p_WP, p_WGO, p_WO)))[3:]
+        np.array,
+        closest_points(*(tuple(x.tolist()) for x in (p_WG, p_WP, p_WGO, p_WO)))[3:],
     )
     s = np.linalg.norm(M_R - p_WG) / np.linalg.norm(p_WP - p_WG)
     M_Rf = p_WG + s * (p_WS - p_WG)

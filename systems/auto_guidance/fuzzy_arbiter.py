@@ -370,28 +370,21 @@ class FuzzyArbiter(Block):
         self._params = params or FuzzyArbiterParams()
         self._params.check()
         self._constants = constants(self._params)
-        self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
-        self._v2 = self.vector_in("v2", [-0.01, 0.0, 0.0])
-        self._v3 = self.vector_in("v3", [0.0, -0.01, 0.0])
-        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
-        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
-        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
-        self._target = self.vector_in("target", TARGET_EXAMPLE)
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        inputs = {
-            port.ticket()
-            for port in (
-                self._v1,
-                self._v2,
-                self._v3,
-                self._guide,
-                self._robot_tool,
-                self._obstacle,
-                self._target,
-            )
+        examples = {
+            "v1": [0.05, 0.0, 0.0],
+            "v2": [-0.01, 0.0, 0.0],
+            "v3": [0.0, -0.01, 0.0],
+            "guide": GUIDE_EXAMPLE,
+            "robot_tool": ROBOT_TOOL_EXAMPLE,
+            "obstacle": OBSTACLE_EXAMPLE,
+            "target": TARGET_EXAMPLE,
         }
+        # In the order in which `_step` takes them.
+        self._inputs = [self.vector_in(*item) for item in examples.items()]
+        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
+        tickets = {port.ticket() for port in self._inputs}
         self._step = self.cached(
-            "step", self._calc_step, inputs | {self.xd_ticket(), self.time_ticket()}
+            "step", self._calc_step, tickets | {self.xd_ticket(), self.time_ticket()}
         )
         step_ticket = {self._step.ticket()}
         self.vector_out("weights", 3, lambda c: self._step.Eval(c)[4:7], step_ticket)
@@ -403,11 +396,5 @@ class FuzzyArbiter(Block):
             self._constants,
             context.get_discrete_state_vector().value(),
             context.get_time(),
-            self._v1.Eval(context),
-            self._v2.Eval(context),
-            self._v3.Eval(context),
-            self._guide.Eval(context),
-            self._robot_tool.Eval(context),
-            self._obstacle.Eval(context),
-            self._target.Eval(context),
+            *[port.Eval(context) for port in self._inputs],
         )

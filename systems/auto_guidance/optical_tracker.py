@@ -152,6 +152,7 @@ def disturb(
 @compiled
 def _expose(
     record: np.ndarray,
+    losses: np.ndarray,
     line: np.ndarray,
     noise: np.ndarray,
     shaft_S: np.ndarray,
@@ -167,7 +168,7 @@ def _expose(
     for tool in range(2):
         shaft = shaft_S if tool == 0 else shaft_O
         seen = all_finite(shaft)
-        for loss in params.losses:
+        for loss in losses:
             if loss[0] <= time < loss[1] and loss[2 + tool] > 0.0:
                 seen = False
         at = 8 * tool
@@ -226,8 +227,8 @@ class OpticalTracker(Block):
             lever=params.body.lever,
             sigma_position=params.body.sigma_position(),
             sigma_direction=params.body.sigma_direction(),
-            losses=np.array(losses),
         )
+        self._losses = np.array(losses)
         example = [0.05, 0.0, -0.12, 0.0, 0.0, -1.0]
         self._shafts = [self.vector_in(tool, example) for tool in TOOLS]
         self._noise = self.DeclareVectorInputPort(
@@ -246,6 +247,7 @@ class OpticalTracker(Block):
         noise: Any = self._noise.Eval(context)
         line = _expose(
             self._constants,
+            self._losses,
             context.get_discrete_state(0).value(),
             noise,
             self._shafts[0].Eval(context),

@@ -72,5 +72,5 @@ def fulcrum(estimate: Numbers) -> Vector:
 
 @compiled
 def usable(estimate: Numbers) -> bool:
-    """True if the estimator knows the tool and gives numbers for its motion."""
-    return estimate[15] > 0.5 and all_finite(estimate[0:12])
+    """True if the estimator knows the tool and gives numbers only."""
+    return estimate[15] > 0.5 and all_finite(estimate)

@@ -73,7 +73,7 @@ class ToolNavigationParams:
     max_insertion: float = 0.2
     max_tilt: float = 0.7
     cone_margin: float = 0.02
-    min_proportion: float = 0.15
+    min_proportion: float = 0.1
     follow_error: float = 0.01
 
     def check(self) -> None:

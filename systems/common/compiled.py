@@ -11,14 +11,17 @@ its first call for the types it gets and cached on disk.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 import hashlib
 from pathlib import Path
+import sys
 from typing import Any
 
 import numba
 from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
 from numba.core.dispatcher import Dispatcher
+from numba.core.event import Listener, install_listener
 import numpy as np
 
 type Numbers = Sequence[float] | np.ndarray
@@ -47,6 +50,29 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = before
     return result
+
+
+class _Announcer(Listener):
+    """Says once that something is being compiled."""
+
+    def __init__(self) -> None:
+        self._said = False
+
+    def on_start(self, event: Any) -> None:
+        """Called when numba begins to compile; not when it loads from its cache."""
+        if not self._said:
+            print("compiling the blocks, once: about 20 s ...", file=sys.stderr)
+        self._said = True
+
+    def on_end(self, event: Any) -> None:
+        """Called when numba has compiled a function."""
+
+
+def announced() -> AbstractContextManager[Any]:
+    """Within this context, a compilation is announced to who sits at a terminal."""
+    if not sys.stderr.isatty():
+        return nullcontext()
+    return install_listener("numba:compile", _Announcer())
 
 
 @cache

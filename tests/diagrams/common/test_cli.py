@@ -74,7 +74,7 @@ def test_set_changes_what_runs(tmp_path):
             "out of reach",
         ),
         (
-            ["run", "gauze_static", "--set", "camera.p_WS=[-0.06, -0.06, -0.1]"],
+            ["run", "gauze_static", "--set", "camera.p_WS=[0.2, 0.2, -0.1]"],
             "outside the view cone",
         ),
         (["run", "gauze_static", "--set", "recording=nowhere.csv"], "nowhere.csv"),

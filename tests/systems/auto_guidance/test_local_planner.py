@@ -13,15 +13,13 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 import pytest
 
-from systems.auto_guidance.backward_movement import BackwardMovement
-from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
-from systems.auto_guidance.go_to_target import GoToTarget, GoToTargetParams
+from systems.auto_guidance.go_to_target import GoToTargetParams
 from systems.auto_guidance.surgeon_tool import SurgeonToolParams, tip_motion
-from systems.auto_guidance.velocity_corrections import VelocityCorrections
 from systems.common import geometry
 from systems.common.geometry import norm
 from tests.benchmarks.crossed_scenes import CONTACT
 from tests.benchmarks.kinematic_loop import LocalPlanner, Robot, estimate
+from tests.benchmarks.planner_step import add_planner
 from tests.loosely import loosely
 
 closest_points = loosely(geometry.closest_points)
@@ -200,18 +198,7 @@ def test_the_drake_blocks_give_the_loops_velocities(kind):
             (("robot_tool", 6), ("obstacle", 17), ("target", 17))
         )
     }
-    blocks = [
-        builder.AddNamedSystem(kind.__name__, kind())
-        for kind in (GoToTarget, VelocityCorrections, BackwardMovement, FuzzyArbiter)
-    ]
-    for block in blocks:
-        for i in range(block.num_output_ports()):
-            port = block.get_output_port(i)
-            ports[port.get_name()] = port
-    for block in blocks:
-        for i in range(block.num_input_ports()):
-            port = block.get_input_port(i)
-            builder.Connect(ports[port.get_name()], port)
+    ports = add_planner(builder, ports)
     names = ("v1", "v2", "v3", "weights", "v_R")
     logs = [LogVectorOutput(ports[name], builder, publish_period=DT) for name in names]
     diagram = builder.Build()

@@ -7,9 +7,10 @@ import subprocess
 import sys
 import textwrap
 
+import numba
 import numpy as np
 
-from systems.common.compiled import compiled, packed
+from systems.common.compiled import announced, compiled, packed
 
 
 @dataclass
@@ -46,6 +47,24 @@ def test_division_by_zero_gives_infinity():
         return 1.0 / x
 
     assert inverse(0.0) == np.inf
+
+
+def test_compilation_is_announced_once_at_a_terminal(capsys, monkeypatch):
+    @numba.njit
+    def one(x):
+        return x + 1.0
+
+    @numba.njit
+    def two(x):
+        return one(x) + 1.0
+
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with announced():
+        two(1.0)
+    assert capsys.readouterr().err.count("compiling") == 1
+    with announced():
+        two(1.0)
+    assert not capsys.readouterr().err
 
 
 def test_a_change_in_a_called_file_is_noticed(tmp_path):

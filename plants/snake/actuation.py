@@ -1,0 +1,237 @@
+"""Wire lengths from postures, equations (2) and (3), and back (paper, IV.B.2, IV.C).
+
+A wire hangs between the points P_i and P'_i of two plates across a ball. The paper
+needs ||P_i P'_i||; it is a perfect square, and linear in the half turn of a ball
+
+    x = (cos(beta/2), sin(beta/2) cos(alpha), sin(beta/2) sin(alpha)),   |x| = 1:
+    p_i = ||P_i P'_i|| = (2h - e) x_0 - 2R (x_1 cos(phi_i) + x_2 sin(phi_i)).
+
+So three wires of a module give x by one constant 3 x 3 matrix, smooth at beta = 0,
+and |x|^2 - 1 says how well the redundant third wire agrees: a slack or broken wire
+shows there. No elimination is needed; `two_wires` holds the paper's own choice.
+
+Wires count from the base: 0 to 2 are module 1's, 3 to 5 module 2's (they run
+through module 1 at their own azimuths), 6 to 8 module 3's. Lengths run from the
+base plate's middle to that of the module's end plate, without what is on the drum;
+the drums ride on the translation.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+import math
+from typing import Any
+
+from numba import njit
+import numpy as np
+from numpy.typing import ArrayLike
+
+from plants.snake.kinematics import Array, postures
+from plants.snake.parameters import MODULES, WIRES, SnakeParams
+
+
+@njit(cache=True)
+def length_of_norm(p: float, R: float, e: float, h: float) -> float:
+    """Length L_i in one module for p = ||P_i P'_i||, (2) and (3) (compiled)."""
+    d = h - e / 2
+    if p <= 2 * d:
+        return 2 * p + 2 * e
+    arc = math.asin(min(p / (2 * math.sqrt(R * R + d * d)), 1.0)) - math.atan(d / R)
+    return 4 * h + 4 * R * arc
+
+
+@njit(cache=True)
+def norm_of_length(L: float, R: float, e: float, h: float) -> float:
+    """Inverse of `length_of_norm`; NaN for a length that no wire has (compiled)."""
+    if 4 * h >= L:
+        return (L - 2 * e) / 2 if 2 * e <= L else math.nan
+    d = h - e / 2
+    angle = (L - 4 * h) / (4 * R) + math.atan(d / R)
+    if angle > math.pi / 2:
+        return math.nan
+    return 2 * math.sqrt(R * R + d * d) * math.sin(angle)
+
+
+@njit(cache=True)
+def _lengths(q: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
+    x = np.empty(3)
+    for i in range(q.shape[0]):
+        L[i] = 0.0
+        for m in range(MODULES):
+            _half_turn(q[i, 1 + 2 * m], q[i, 2 + 2 * m], x)
+            add_module(x, rows, m, R, e, h, 1.0, L[i])
+
+
+@njit(cache=True)
+def _half_turn(alpha: float, beta: float, x: Any) -> None:
+    s = math.sin(beta / 2)
+    x[0], x[1], x[2] = math.cos(beta / 2), s * math.cos(alpha), s * math.sin(alpha)
+
+
+@njit(cache=True)
+def add_module(
+    x: Any, rows: Any, m: int, R: float, e: float, h: float, sign: float, L: Any
+) -> None:
+    """Adds a module's share, times sign, to all wires through it (compiled)."""
+    for w in range(WIRES * m, WIRES * MODULES):
+        p = rows[w, 0] * x[0] + rows[w, 1] * x[1] + rows[w, 2] * x[2]
+        L[w] += sign * length_of_norm(p, R, e, h)
+
+
+@njit(cache=True)
+def _bends(
+    L: Any, rows: Any, inverse: Any, R: float, e: float, h: float, q: Any, residual: Any
+) -> None:
+    x, left, p = np.empty(3), np.empty(WIRES * MODULES), np.empty(WIRES)
+    for i in range(L.shape[0]):
+        left[:] = L[i]
+        for m in range(MODULES):
+            for j in range(WIRES):
+                p[j] = norm_of_length(left[WIRES * m + j], R, e, h)
+            for r in range(3):
+                row = inverse[m, r]
+                x[r] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2]
+            lateral = x[1] * x[1] + x[2] * x[2]
+            square = x[0] * x[0] + lateral
+            residual[i, m] = square - 1.0
+            q[i, 2 * m] = math.atan2(x[2], x[1])
+            q[i, 2 * m + 1] = 2 * math.atan2(math.sqrt(lateral), x[0])
+            if m < MODULES - 1:
+                size = math.sqrt(square)
+                for r in range(3):
+                    x[r] /= size
+                add_module(x, rows, m, R, e, h, -1.0, left)
+
+
+@lru_cache(maxsize=16)
+def _matrices(R: float, d: float, first_azimuths: tuple[float, ...]) -> Any:
+    """Rows that take x to p_i, (9, 3), and each module's inverse, (3, 3, 3)."""
+    turns = 2 * np.pi / WIRES * np.arange(WIRES)
+    phi = np.add.outer(np.array(first_azimuths), turns).ravel()
+    rows = np.stack(
+        [np.full_like(phi, 2 * d), -2 * R * np.cos(phi), -2 * R * np.sin(phi)], axis=1
+    )
+    return rows, np.ascontiguousarray(np.linalg.inv(rows.reshape(MODULES, WIRES, 3)))
+
+
+def norm_rows(params: SnakeParams) -> Array:
+    """Rows that take x to p_i, one a wire, (9, 3) in m."""
+    return _matrices(params.ball_radius, params.face, tuple(params.first_azimuths))[0]
+
+
+def _geometry(params: SnakeParams) -> tuple[float, float, float]:
+    return params.ball_radius, params.plate_thickness, params.half_pitch
+
+
+def wire_lengths(q: ArrayLike, params: SnakeParams) -> Array:
+    """Lengths of the nine wires in m, equations (2) and (3).
+
+    Args:
+        q: Postures (..., 7).
+        params: The snake.
+
+    Returns:
+        Lengths (..., 9).
+    """
+    q = postures(q)
+    L = np.empty((*q.shape[:-1], WIRES * MODULES))
+    _lengths(
+        np.ascontiguousarray(q.reshape(-1, 7)),
+        norm_rows(params),
+        *_geometry(params),
+        L.reshape(-1, WIRES * MODULES),
+    )
+    return L
+
+
+@dataclass
+class Bends:
+    """Bends from wire lengths.
+
+    Attributes:
+        q: alpha1, beta1, alpha2, ... in rad, (..., 6). NaN from the first module
+            on whose wires have lengths that no posture has.
+        residual: |x|^2 - 1 of each module, (..., 3): 0 if its three wires agree.
+    """
+
+    q: Array
+    residual: Array
+
+
+def bends_of_lengths(L: ArrayLike, params: SnakeParams) -> Bends:
+    """Forward actuation from all wires, module after module (paper, IV.C).
+
+    Args:
+        L: Lengths in m, (..., 9).
+        params: The snake.
+    """
+    L = np.asarray(L, float)
+    if L.ndim == 0 or L.shape[-1] != WIRES * MODULES:
+        raise ValueError(f"L has shape {L.shape}, expected nine wires on the last axis")
+    rows, inverse = _matrices(
+        params.ball_radius, params.face, tuple(params.first_azimuths)
+    )
+    q = np.empty((*L.shape[:-1], 2 * MODULES))
+    residual = np.empty((*L.shape[:-1], MODULES))
+    _bends(
+        np.ascontiguousarray(L.reshape(-1, WIRES * MODULES)),
+        rows,
+        inverse,
+        *_geometry(params),
+        q.reshape(-1, 2 * MODULES),
+        residual.reshape(-1, MODULES),
+    )
+    return Bends(q, residual)
+
+
+def length_range(params: SnakeParams) -> tuple[Array, Array]:
+    """Least and largest length of each wire over all postures in m, (9,) each.
+
+    A wire is shortest with every module bent to its side and longest with every
+    module bent away.
+    """
+    half = params.max_bend / 2
+    d, R = params.face, params.ball_radius
+    c, s = 2 * d * math.cos(half), 2 * R * math.sin(half)
+    through = np.repeat(np.arange(1, MODULES + 1), WIRES)
+    shortest, longest = (length_of_norm(p, *_geometry(params)) for p in (c - s, c + s))
+    return through * shortest, through * longest
+
+
+def checked_bends(L: ArrayLike, params: SnakeParams, tolerance: float = 1e-6) -> Array:
+    """Bends (6,) for one set of lengths (9,) that a posture must have.
+
+    Args:
+        L: Lengths in m, (9,).
+        params: The snake.
+        tolerance: How far, in m, the lengths may be from a posture's.
+
+    Raises:
+        ValueError: If no posture has these lengths; it names wire or module, what
+            is expected, and the nearest lengths where there are any.
+    """
+    L = np.asarray(L, float)
+    low, high = length_range(params)
+    for w in np.flatnonzero(~((low - tolerance <= L) & (high + tolerance >= L))):
+        raise ValueError(
+            f"wire {w} of module {w // WIRES + 1}: length {1e3 * L[w]:.3f} mm, no "
+            f"posture is outside {1e3 * low[w]:.3f} to {1e3 * high[w]:.3f} mm"
+        )
+    bends = bends_of_lengths(L, params).q
+    for m in range(MODULES):
+        beta = float(bends[2 * m + 1])
+        if not beta <= params.max_bend + tolerance / params.ball_radius:
+            raise ValueError(
+                f"module {m + 1}: these lengths bend it by beta={beta:.4f} rad, "
+                f"beyond max_bend={params.max_bend:.4f} rad"
+            )
+        nearest = wire_lengths(np.concatenate([[0.0], bends]), params)
+        own = slice(WIRES * m, WIRES * (m + 1))
+        worst = float(np.abs(nearest - L)[own].max())
+        if not worst <= tolerance:
+            raise ValueError(
+                f"module {m + 1}: no posture has its wire lengths "
+                f"{np.round(1e3 * L[own], 3).tolist()} mm, they disagree by "
+                f"{1e3 * worst:.3f} mm; nearest "
+                f"{np.round(1e3 * nearest[own], 3).tolist()} mm"
+            )
+    return bends
