@@ -25,14 +25,15 @@ Braking: the closing speed allowed falls as gamma (rho - D_safe), so the deceler
 asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_O).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from systems.auto_guidance import obstacle_tools as tools_around
 from systems.auto_guidance import workspace as limits
-from systems.auto_guidance.obstacle_tools import obstacle_tools
+from systems.auto_guidance.obstacle_tools import Margins, obstacle_tools
 from systems.auto_guidance.shadow_body import FULCRUM, SAFE, TIP, VELOCITY
 from systems.auto_guidance.signals import (
     CAMERA_EXAMPLE,
@@ -74,7 +75,7 @@ TOOLS = 3
 
 @dataclass
 class ClearanceConstraintParams:
-    """Parameters of `ClearanceConstraint`. Distances of the axes; contact is at 5 mm.
+    """Parameters of `ClearanceConstraint`.
 
     Attributes:
         active: If not, the velocity passes unchanged, and the status is still given.
@@ -82,18 +83,9 @@ class ClearanceConstraintParams:
         max_speed: v_max that evasion may use, m/s.
         turning_speed: omega_max of the shaft, rad/s.
         rate: gamma, 1/s; at most a_max / (v_max + V_O).
-        safe_distance: D_safe, m.
-        plan_distance: D that ways are planned with, m; S's tip is left out accordingly.
-        target_distance: D_safe of S's own shaft, m.
-        avoid_target: Whether S's shaft is an obstacle.
-        avoid_camera: Whether the endoscope is one.
-        sigmas: Standard deviations of an estimate that are added to the distances.
-        latency: From the tracker's exposure to the arm's motion, s; times sigma_v.
-        most_margin: No more than this is added, m.
         obstacle_speed: V_O to be reckoned with, m/s: within D_safe + V_O / gamma a tool
             counts as near.
         dodge: Whether to dodge.
-        workspace: Limits of R's tip.
     """
 
     active: bool = True
@@ -101,17 +93,8 @@ class ClearanceConstraintParams:
     max_speed: float = 0.1
     turning_speed: float = 1.0
     rate: float = 4.0
-    safe_distance: float = 0.007
-    plan_distance: float = 0.0095
-    target_distance: float = 0.006
-    avoid_target: bool = True
-    avoid_camera: bool = True
-    sigmas: float = 3.0
-    latency: float = 0.03
-    most_margin: float = 0.004
     obstacle_speed: float = 0.06
     dodge: bool = True
-    workspace: WorkspaceParams = field(default_factory=WorkspaceParams)
 
     def check(self) -> None:
         """Checks the values.
@@ -124,7 +107,7 @@ class ClearanceConstraintParams:
                 raise ValueError(
                     f"clearance_constraint: {name}={value} must be finite and >= 0"
                 )
-        for name in ("period", "max_speed", "turning_speed", "rate", "safe_distance"):
+        for name in ("period", "max_speed", "turning_speed", "rate"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(
                     f"clearance_constraint: {name}={getattr(self, name)} must be > 0"
@@ -134,11 +117,10 @@ class ClearanceConstraintParams:
                 f"clearance_constraint: rate={self.rate} /s is too fast for "
                 f"period={self.period} s, expected at most {0.5 / self.period:.4g} /s"
             )
-        self.workspace.check()
 
 
 def constants(params: ClearanceConstraintParams) -> np.ndarray:
-    """The parameters as the compiled functions take them, but for the workspace."""
+    """The parameters as the compiled functions take them."""
     params.check()
     return packed(params)
 
@@ -310,6 +292,7 @@ def constrain(
 @compiled
 def _step(
     record: np.ndarray,
+    margins: np.ndarray,
     workspace: np.ndarray,
     state: np.ndarray,
     v_R: np.ndarray,
@@ -329,7 +312,7 @@ def _step(
         none = (0.0, 0.0, 0.0)
         return np.array(none + v + (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     g, p, s = xyz(robot_tool, 0), xyz(robot_tool, 3), guide[7]
-    tools = obstacle_tools(params, g, obstacle, target, camera)
+    tools = obstacle_tools(margins[0], g, obstacle, target, camera)
     wanted = (v[0] / s, v[1] / s, v[2] / s)
     v, dodges, status = constrain(
         params, workspace[0], view_cone, g, p, wanted, tools, state
@@ -365,19 +348,29 @@ class ClearanceConstraint(Block):
     The discrete state is whether R dodges each tool (3).
     """
 
-    def __init__(self, params: ClearanceConstraintParams | None = None) -> None:
+    def __init__(
+        self,
+        params: ClearanceConstraintParams | None = None,
+        margins: Margins | None = None,
+        workspace: WorkspaceParams | None = None,
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            margins: Distances to the tools; the defaults if None.
+            workspace: Limits of R's tip; the defaults if None.
 
         Raises:
             ValueError: If a parameter is out of range.
         """
         super().__init__()
         params = params or ClearanceConstraintParams()
-        self._constants = constants(params)
-        self._workspace = limits.constants(params.workspace)
+        self._constants = (
+            constants(params),
+            tools_around.constants(margins or Margins()),
+            limits.constants(workspace or WorkspaceParams()),
+        )
         self._inputs = [
             self.vector_in("v_R", [0.05, 0.0, 0.0]),
             self.vector_in("guide", GUIDE_EXAMPLE),
@@ -397,8 +390,7 @@ class ClearanceConstraint(Block):
 
     def _calc_step(self, context: Any) -> np.ndarray:
         return _step(
-            self._constants,
-            self._workspace,
+            *self._constants,
             context.get_discrete_state_vector().value(),
             *(port.Eval(context) for port in self._inputs),
         )

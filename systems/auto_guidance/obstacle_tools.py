@@ -5,7 +5,8 @@ comes nearer to than the distance that is planned with. What is left of S is an 
 like any other.
 """
 
-from math import sqrt
+from dataclasses import dataclass
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from systems.auto_guidance.shadow_body import (
     VELOCITY,
 )
 from systems.auto_guidance.signals import fulcrum, usable, velocity
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
     along,
@@ -37,12 +38,64 @@ _CLEAR = 0.001
 """Beyond the distance that is planned with, m."""
 
 
+@dataclass
+class Margins:
+    """How far R keeps from the tools: distances of the axes; instruments touch at 5 mm.
+
+    Attributes:
+        safe_distance: D_safe, that the clearance constraint holds, m.
+        plan_distance: D, that ways are planned with, m.
+        target_distance: D_safe of S's own shaft, m.
+        camera_distance: D_safe of the endoscope, which is twice as thick, m.
+        avoid_target: Whether S's shaft is an obstacle.
+        avoid_camera: Whether the endoscope is one.
+        sigmas: Standard deviations of an estimate that are added to the distances.
+        latency: From the tracker's exposure to the arm's motion, s; times sigma_v.
+        most_margin: No more than this is added for an estimate, m.
+    """
+
+    safe_distance: float = 0.007
+    plan_distance: float = 0.0095
+    target_distance: float = 0.006
+    camera_distance: float = 0.0095
+    avoid_target: bool = True
+    avoid_camera: bool = True
+    sigmas: float = 3.0
+    latency: float = 0.03
+    most_margin: float = 0.004
+
+    def check(self) -> None:
+        """Checks the values.
+
+        Raises:
+            ValueError: With the name, the value and what was expected.
+        """
+        for name, value in vars(self).items():
+            if not 0.0 <= value < inf:
+                raise ValueError(f"margins: {name}={value} must be finite and >= 0")
+        if not 0.0 < self.safe_distance < self.plan_distance:
+            raise ValueError(
+                f"margins: plan_distance={self.plan_distance} m must be over "
+                f"safe_distance={self.safe_distance} m, and both over 0"
+            )
+
+
+def constants(margins: Margins) -> np.ndarray:
+    """The margins as the compiled functions take them.
+
+    Raises:
+        ValueError: If a margin is out of range.
+    """
+    margins.check()
+    return packed(margins)
+
+
 @compiled
-def margin(params: Any, estimate: Numbers) -> float:
+def margin(margins: Any, estimate: Numbers) -> float:
     """What the estimate's own uncertainty adds to the distances, m."""
-    late = params.latency * estimate[13]
+    late = margins.latency * estimate[13]
     sigma = sqrt(estimate[12] * estimate[12] + late * late)
-    return min(params.most_margin, params.sigmas * sigma)
+    return min(margins.most_margin, margins.sigmas * sigma)
 
 
 @compiled
@@ -63,58 +116,60 @@ def spared_length(g: Vector, p_WS: Vector, g_s: Vector, distance: float) -> floa
 
 
 @compiled
-def set_row(row: np.ndarray, params: Any, estimate: Numbers) -> None:
+def set_row(row: np.ndarray, margins: Any, estimate: Numbers) -> None:
     """Writes an estimate (17) as a row (11) of obstacle tools, with its margin."""
-    extra = margin(params, estimate)
+    extra = margin(margins, estimate)
     for i in range(6):
         row[i] = estimate[i]
     for i in range(3):
         row[FULCRUM + i] = estimate[9 + i]
-    row[SAFE] = params.safe_distance + extra
-    row[PLAN] = params.plan_distance + extra
+    row[SAFE] = margins.safe_distance + extra
+    row[PLAN] = margins.plan_distance + extra
 
 
 @compiled
-def tool_rows(params: Any, estimates: np.ndarray) -> np.ndarray:
+def tool_rows(margins: Any, estimates: np.ndarray) -> np.ndarray:
     """Obstacle tools (n, 11) of estimates (n, 17)."""
     rows = np.empty((len(estimates), COLUMNS))
     for i in range(len(estimates)):
-        set_row(rows[i], params, estimates[i])
+        set_row(rows[i], margins, estimates[i])
     return rows
 
 
 @compiled
 def obstacle_tools(
-    params: Any, g: Vector, obstacle: Numbers, target: Numbers, camera: Numbers
+    margins: Any, g: Vector, obstacle: Numbers, target: Numbers, camera: Numbers
 ) -> np.ndarray:
     """The obstacle tools (n, 11), O first; see `shadow_body` for the columns.
 
     Args:
-        params: A record with `safe_distance` and `plan_distance` of the axes, m,
-            `target_distance`, that to S's shaft, and `avoid_target`, `avoid_camera`.
+        margins: A record of `constants`.
         g: Fulcrum G_R, m.
         obstacle: Estimate (17) of O, usable.
         target: Estimate (17) of S, usable.
         camera: Estimate (17) of the endoscope.
     """
     rows = np.empty((3, COLUMNS))
-    set_row(rows[0], params, obstacle)
+    set_row(rows[0], margins, obstacle)
     count = 1
-    if params.avoid_target:
+    if margins.avoid_target:
         g_s, p_s = fulcrum(target), xyz(target, 0)
         shaft = sub(p_s, g_s)
         length = norm(shaft)
-        spared = spared_length(g, p_s, g_s, params.plan_distance + _CLEAR)
+        spared = spared_length(g, p_s, g_s, margins.plan_distance + _CLEAR)
         if spared < 0.95 * length:
             row, o = rows[count], unit(shaft)
-            set_row(row, params, target)
+            set_row(row, margins, target)
             end = along(p_s, -spared, o)
             v = shaft_point_velocity(1.0 - spared / length, o, velocity(target))
             for i in range(3):
                 row[TIP + i], row[VELOCITY + i] = end[i], v[i]
-            row[SAFE] += params.target_distance - params.safe_distance
+            row[SAFE] += margins.target_distance - margins.safe_distance
             count += 1
-    if params.avoid_camera and usable(camera):
-        set_row(rows[count], params, camera)
+    if margins.avoid_camera and usable(camera):
+        set_row(rows[count], margins, camera)
+        thicker = margins.camera_distance - margins.safe_distance
+        rows[count, SAFE] += thicker
+        rows[count, PLAN] += thicker
         count += 1
     return rows[:count]

@@ -9,16 +9,17 @@ the goal. The tip's velocity is v = min(v_max, k Gamma) along the way, plus that
 moving target, and the guide point's v_1 = s v, as in the paper's form (`go_to_target`).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from systems.auto_guidance import obstacle_tools as tools_around
 from systems.auto_guidance import workspace as limits
 from systems.auto_guidance.bypass_route import choose_way
 from systems.auto_guidance.go_to_target import guide_point
-from systems.auto_guidance.obstacle_tools import obstacle_tools
+from systems.auto_guidance.obstacle_tools import Margins, obstacle_tools
 from systems.auto_guidance.signals import (
     CAMERA_EXAMPLE,
     OBSTACLE_EXAMPLE,
@@ -37,21 +38,13 @@ from systems.common.geometry import Vector, all_finite, along, limited, sub, xyz
 
 @dataclass
 class ToolBypassParams:
-    """Parameters of `ToolBypass`. Distances are those of the axes; contact is at 5 mm.
+    """Parameters of `ToolBypass`.
 
     Attributes:
         period: Of the update, s.
         max_speed: v_max of the tip, m/s.
         max_acceleration: Of the tip's commanded velocity, m/s^2.
         approach_rate: k, 1/s: how the speed falls before the goal.
-        safe_distance: D_safe, that the clearance constraint holds, m.
-        plan_distance: D, that ways are planned with, m.
-        target_distance: D_safe of S's own shaft, m.
-        avoid_target: Whether S's shaft is an obstacle.
-        avoid_camera: Whether the endoscope is one.
-        sigmas: Standard deviations of an estimate that are added to the distances.
-        latency: From the tracker's exposure to the arm's motion, s; times sigma_v.
-        most_margin: No more than this is added, m.
         blocked_room: The goal counts as blocked below D_safe and this, m,
         freed_room: and as free again above D_safe and this, m.
         waiting_room: A pose to wait in is D_safe and this away, m.
@@ -59,21 +52,12 @@ class ToolBypassParams:
         switch_ratio: Another edge is taken if it is shorter than this part
         switch_gain: of the one in use, and shorter by this as well, m.
         proportion_floor: Least s, for shafts that are closest at G_R.
-        workspace: Limits of R's tip.
     """
 
     period: float = 1.0 / 60.0
     max_speed: float = 0.06
     max_acceleration: float = 1.0
     approach_rate: float = 4.0
-    safe_distance: float = 0.007
-    plan_distance: float = 0.0095
-    target_distance: float = 0.006
-    avoid_target: bool = True
-    avoid_camera: bool = True
-    sigmas: float = 3.0
-    latency: float = 0.03
-    most_margin: float = 0.004
     blocked_room: float = 0.0003
     freed_room: float = 0.001
     waiting_room: float = 0.001
@@ -81,7 +65,6 @@ class ToolBypassParams:
     switch_ratio: float = 0.85
     switch_gain: float = 0.005
     proportion_floor: float = 0.1
-    workspace: WorkspaceParams = field(default_factory=WorkspaceParams)
 
     def check(self) -> None:
         """Checks the values.
@@ -97,11 +80,6 @@ class ToolBypassParams:
                 raise ValueError(
                     f"tool_bypass: {name}={getattr(self, name)} must be > 0"
                 )
-        if not 0.0 < self.safe_distance < self.plan_distance:
-            raise ValueError(
-                f"tool_bypass: plan_distance={self.plan_distance} m must be over "
-                f"safe_distance={self.safe_distance} m, and both over 0"
-            )
         if not self.blocked_room < self.freed_room <= self.waiting_room:
             raise ValueError(
                 f"tool_bypass: blocked_room={self.blocked_room} m, "
@@ -117,11 +95,10 @@ class ToolBypassParams:
                 f"tool_bypass: proportion_floor={self.proportion_floor} must be in "
                 f"(0, 1]"
             )
-        self.workspace.check()
 
 
 def constants(params: ToolBypassParams) -> np.ndarray:
-    """The parameters as the compiled functions take them, but for the workspace."""
+    """The parameters as the compiled functions take them."""
     params.check()
     return packed(params)
 
@@ -175,6 +152,7 @@ def bypass(
 @compiled
 def _step(
     record: np.ndarray,
+    margins: np.ndarray,
     workspace: np.ndarray,
     state: np.ndarray,
     time: float,
@@ -201,7 +179,7 @@ def _step(
     else:
         guide = guide_point(robot_tool, obstacle, p_s, params.proportion_floor)
         if usable(obstacle) and usable(target) and all_finite(view_cone):
-            tools = obstacle_tools(params, g, obstacle, target, camera)
+            tools = obstacle_tools(margins[0], g, obstacle, target, camera)
             v_tip, edge, is_waiting, aim = bypass(
                 params,
                 workspace[0],
@@ -246,19 +224,29 @@ class ToolBypass(Block):
     whether R waits. The outputs are those of the step from then to now.
     """
 
-    def __init__(self, params: ToolBypassParams | None = None) -> None:
+    def __init__(
+        self,
+        params: ToolBypassParams | None = None,
+        margins: Margins | None = None,
+        workspace: WorkspaceParams | None = None,
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            margins: Distances to the tools; the defaults if None.
+            workspace: Limits of R's tip; the defaults if None.
 
         Raises:
             ValueError: If a parameter is out of range.
         """
         super().__init__()
         params = params or ToolBypassParams()
-        self._constants = constants(params)
-        self._workspace = limits.constants(params.workspace)
+        self._constants = (
+            constants(params),
+            tools_around.constants(margins or Margins()),
+            limits.constants(workspace or WorkspaceParams()),
+        )
         self._inputs = [
             self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE),
             self.vector_in("obstacle", OBSTACLE_EXAMPLE),
@@ -279,8 +267,7 @@ class ToolBypass(Block):
 
     def _calc_step(self, context: Any) -> np.ndarray:
         return _step(
-            self._constants,
-            self._workspace,
+            *self._constants,
             context.get_discrete_state_vector().value(),
             context.get_time(),
             *(port.Eval(context) for port in self._inputs),

@@ -1,6 +1,6 @@
 """The planners of the bypass benchmark, as the kinematic loop takes them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import time
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from systems.auto_guidance import (
     clearance_constraint,
+    obstacle_tools,
     tool_bypass,
     workspace,
 )
@@ -16,7 +17,7 @@ from systems.auto_guidance.bypass_route import up_and_over
 from systems.auto_guidance.clearance_constraint import ClearanceConstraintParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams, guide_point
-from systems.auto_guidance.obstacle_tools import tool_rows
+from systems.auto_guidance.obstacle_tools import Margins
 from systems.auto_guidance.tool_bypass import ToolBypassParams
 from systems.auto_guidance.workspace import WorkspaceParams
 from systems.common.geometry import Vector, along, limited, sub
@@ -29,16 +30,16 @@ NO_CONE = np.array([0.0, 0.0, 0.2, 0.0, 0.0, -1.0, 3.2])
 ROOM = WorkspaceParams(
     min_insertion=ROBOT.least_insertion, max_insertion=0.5, max_tilt=3.1, floor=-0.065
 )
-BYPASS = ToolBypassParams(
-    max_speed=SPEED, avoid_target=False, avoid_camera=False, workspace=ROOM
-)
-CLEARANCE = ClearanceConstraintParams(
-    max_speed=SPEED,
-    turning_speed=ROBOT.max_turning,
-    avoid_target=False,
-    avoid_camera=False,
-    workspace=ROOM,
-)
+BYPASS = ToolBypassParams(max_speed=SPEED)
+CLEARANCE = ClearanceConstraintParams(max_speed=SPEED, turning_speed=ROBOT.max_turning)
+MARGINS = Margins()
+_ROOM = workspace.constants(ROOM)[0]
+_MARGINS = obstacle_tools.constants(MARGINS)[0]
+
+
+def around(obstacle: np.ndarray, others: Sequence[np.ndarray]) -> np.ndarray:
+    """Obstacle tools (n, 11) of the estimates of O and of the further tools."""
+    return obstacle_tools.tool_rows(_MARGINS, np.array([obstacle, *others]))
 
 
 @dataclass
@@ -50,7 +51,6 @@ class Bypass(LocalPlanner):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._bypass = tool_bypass.constants(self.bypass)[0]
-        self._room = workspace.constants(self.bypass.workspace)[0]
         self.edge, self.is_waiting, self.edge_switches = 0, False, 0
         self.aim: Vector = (0.0, 0.0, 0.0)
 
@@ -59,7 +59,7 @@ class Bypass(LocalPlanner):
         edge = self.edge
         v_tip, self.edge, self.is_waiting, self.aim = tool_bypass.bypass(
             self._bypass,
-            self._room,
+            _ROOM,
             NO_CONE,
             self._v1_tip,
             dt,
@@ -67,7 +67,7 @@ class Bypass(LocalPlanner):
             p,
             goal,
             (0.0, 0.0, 0.0),
-            tool_rows(self._bypass, np.array([obstacle, *others])),
+            around(obstacle, others),
             edge,
             self.is_waiting,
         )
@@ -102,8 +102,8 @@ class RetractTurnInsert:
     def step(self, dt, robot_tool, obstacle, target, others=()) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
         g, p, goal = (tuple(x) for x in (robot_tool[:3], robot_tool[3:], target[:3]))
-        tools = tool_rows(self._params, np.array([obstacle, *others]))
-        keep = np.full(len(tools), BYPASS.safe_distance + BYPASS.goal_slack)
+        tools = around(obstacle, others)
+        keep = np.full(len(tools), MARGINS.safe_distance + BYPASS.goal_slack)
         direction, length = up_and_over(tools, keep, ROOM.min_insertion, g, p, goal)
         speed = min(SPEED, BYPASS.approach_rate * length)
         return along((0.0, 0.0, 0.0), speed, direction)
@@ -131,7 +131,6 @@ class Constrained:
 
     def __post_init__(self) -> None:
         self._record = clearance_constraint.constants(self.params)[0]
-        self._room = workspace.constants(self.params.workspace)[0]
         self._dodging = np.zeros(clearance_constraint.TOOLS)
         self.status = np.zeros(6)
 
@@ -142,12 +141,12 @@ class Constrained:
         g, p = tuple(robot_tool[:3]), tuple(robot_tool[3:])
         v, self._dodging, self.status = clearance_constraint.constrain(
             self._record,
-            self._room,
+            _ROOM,
             NO_CONE,
             g,
             p,
             wanted,
-            tool_rows(self._record, np.array([obstacle, *others])),
+            around(obstacle, others),
             self._dodging,
         )
         self.seconds.append(time.perf_counter() - start)
