@@ -41,6 +41,7 @@ class Study:
         decorate: Adds trails, arrows and the like to a recording.
         controller: Name of the block whose updates mark a whole control instant
             for `planner_step_median`; empty if there is none.
+        optional: Those of `signals` that not every diagram of the study exports.
         required: Dotted keys that a scenario's file must have.
         integrator: Makes the SimulatorConfig of a scenario; None for that of all
             continuous plants (`diagrams.common.run.INTEGRATOR`).
@@ -58,6 +59,7 @@ class Study:
     plots: Callable[[Any], dict[str, Any]]
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
+    optional: frozenset[str] = frozenset()
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)

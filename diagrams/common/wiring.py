@@ -39,6 +39,12 @@ def port_of(systems: Mapping[str, Any], signal: str, output: bool) -> Any:
     return find(port)
 
 
+def has_input(systems: Mapping[str, Any], signal: str) -> bool:
+    """Whether the input that `system.port` names is there."""
+    name, _, port = signal.partition(".")
+    return name in systems and systems[name].HasInputPort(port)
+
+
 def connect(
     builder: Any, systems: Mapping[str, Any], wires: Iterable[tuple[str, str]]
 ) -> None:

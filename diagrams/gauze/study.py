@@ -36,6 +36,9 @@ SIGNALS = {
     "planner.v3": XYZ,
     "planner.weights": ("c1", "c2", "c3"),
     "planner.v_R": XYZ,
+    "planner.v_safe": XYZ,
+    "planner.clearance": ("room", "near", "condition", "dodge", "change", "missed"),
+    "planner.way": ("way", "waiting", "aim_x", "aim_y", "aim_z"),
     "navigation.tool": (
         *SHAFT,
         *(f"v_{axis}" for axis in XYZ),
@@ -75,6 +78,7 @@ STUDY = Study(
     check=check,
     measure=measure,
     signals=SIGNALS,
+    optional=frozenset({"planner.way"}),
     log_period=1.0 / 30.0,
     plots=plots,
     decorate=decorate,
