@@ -9,6 +9,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 
 STUDIES = {
     "gauze": "diagrams.gauze.study",
+    "wrist": "diagrams.wrist.study",
     "snake": "diagrams.resection.snake_study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
@@ -36,16 +37,18 @@ class Study:
         measure: The figures of a finished run, flat and in SI units.
         signals: Exported ports to log: port name to column names. A
             one-element port's column is the port's name itself.
+        optional: Those of the signals that only some scenarios' diagrams export.
         log_period: Period of the log [s], on the control clock.
         plots: Makes the figures of a run, by file name without ending.
         decorate: Adds trails, arrows and the like to a recording.
         controller: Name of the block whose updates mark a whole control instant
             for `planner_step_median`; empty if there is none.
-        optional: Those of `signals` that not every diagram of the study exports.
         required: Dotted keys that a scenario's file must have.
         integrator: Makes the SimulatorConfig of a scenario; None for that of all
             continuous plants (`diagrams.common.run.INTEGRATOR`).
         view: The replay's camera.
+        adjust: Called with scenario, diagram and root context before every frame,
+            for parameters of the plant that change with time.
         frame_rate: Frames of the replay per simulated second [1/s].
     """
 
@@ -60,6 +63,7 @@ class Study:
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
     optional: frozenset[str] = frozenset()
+    adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)

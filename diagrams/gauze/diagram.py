@@ -9,6 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from diagrams.common.wiring import connect, export, has_input, swap
+from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from systems.auto_guidance.backward_movement import BackwardMovement
@@ -76,7 +77,21 @@ WIRES = (
     ("obstacle_tool.shaft", "posed_tools.O"),
     ("endoscope.shaft", "posed_tools.C"),
 )
-"""Every signal of the diagram but the plant's own."""
+"""Every signal of the diagram but the plant's own, the fulcrum known."""
+
+TOLD = (
+    ("fulcrum.y0", "robot_location.fulcrum"),
+    ("tool_navigation.tool", "joint_commands.tool"),
+)
+"""The wires that the passive wrist takes the place of."""
+
+EMULATED = (
+    *WRIST_WIRES,
+    ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("tool_navigation.tool", "passive_wrist.tool_wanted"),
+    ("passive_wrist.permission", "tool_navigation.permission"),
+)
+"""Figure 2's passive wrist emulation between the local planner and the arm."""
 
 EXTRA_WIRES = (
     ("endoscope.estimate", "go_to_target.camera"),
@@ -145,7 +160,7 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         max_tilt=s.navigation.max_tilt,
         cone_margin=s.navigation.cone_margin,
     )
-    return {
+    blocks = {
         "target_tool": SurgeonTool(target),
         "obstacle_tool": HuntingTool(obstacle, s.hunt)
         if s.hunt.speed
@@ -157,7 +172,6 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "target_estimator": TrajectoryEstimator(estimators[0]),
         "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
-        "fulcrum": ConstantVectorSource(s.robot.p_WG),
         "robot_location": RobotLocation(s.instrument),
         "go_to_target": ToolBypass(s.tool_bypass, s.margins, limits)
         if s.behaviour == "bypass"
@@ -171,6 +185,9 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
+    if not s.emulated:
+        blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
+    return blocks
 
 
 def make_gauze_diagram(
@@ -195,9 +212,15 @@ def make_gauze_diagram(
     for name, block in blocks.items():
         builder.AddNamedSystem(name, block)
     systems = theatre.systems | blocks
-    connect(builder, systems, WIRES)
+    if scenario.emulated:
+        systems |= add_wrist(builder, theatre, scenario)
+        connect(builder, systems, [w for w in WIRES if w not in TOLD])
+        connect(builder, systems, EMULATED)
+        export(builder, systems, EXPORTS | WRIST_EXPORTS)
+    else:
+        connect(builder, systems, WIRES)
+        export(builder, systems, EXPORTS)
     connect(builder, systems, [w for w in EXTRA_WIRES if has_input(systems, w[1])])
-    export(builder, systems, EXPORTS)
     if scenario.behaviour == "bypass":
         export(builder, systems, EXTRA_EXPORTS)
     diagram = builder.Build()

@@ -5,6 +5,7 @@ from typing import Any
 from matplotlib.figure import Figure
 import numpy as np
 
+from diagrams.common import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, new_figure
 from systems.common.geometry import closest_points
 
@@ -167,9 +168,14 @@ def virtual_force(run: Any) -> Figure:
 
 def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
-    return {
+    figures = {
         "trajectory": trajectory(run),
         "speeds": speeds(run),
         "forces": forces(run),
         "virtual_force": virtual_force(run),
     }
+    if run.scenario.emulated:
+        start = run.scenario.measure_from
+        figures["forces"] = wrist_plots.forces({run.scenario.wrist: run}, start)
+        figures["estimate"] = wrist_plots.estimate(run, start)
+    return figures

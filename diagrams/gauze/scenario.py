@@ -6,6 +6,7 @@ import math
 import numpy as np
 
 from diagrams.common.scenario import Scenario, ScenarioError, nearest
+from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
@@ -46,7 +47,7 @@ class RobotTool:
 
 
 @dataclass
-class GauzeScenario(Scenario):
+class GauzeScenario(Scenario, WristSettings):
     """Auto-guided movements (section 5 of the paper): gauze to the surgeon.
 
     Attributes:
@@ -57,11 +58,13 @@ class GauzeScenario(Scenario):
         behaviour: Form of "go to target": "bypass" (attract or bypass), or "field"
             (the paper's sum of potentials, see `go_to_target.form`).
         hunt: O chases the robot's shaft, if its speed is not 0.
+        measure_from: Force figures of the wrist start here [s].
     """
 
     recording: str = field(default="", metadata={"file": True})
     known_fulcrums: bool = False
     behaviour: str = "bypass"
+    measure_from: float = 0.0
     robot: RobotTool = field(default_factory=RobotTool)
     target: SurgeonToolParams = field(default_factory=SurgeonToolParams)
     obstacle: SurgeonToolParams = field(default_factory=SurgeonToolParams)
@@ -91,6 +94,11 @@ class GauzeScenario(Scenario):
     instrument: InstrumentParams = field(default_factory=InstrumentParams)
     abdomen: AbdomenParams = field(default_factory=AbdomenParams)
 
+    @property
+    def emulated(self) -> bool:
+        """Whether the passive wrist is in the diagram: its fulcrum is not given."""
+        return self.wrist != "known" or not self.wall_motion.still
+
 
 BEHAVIOURS = ("bypass", "field")
 
@@ -111,6 +119,7 @@ def check(scenario: GauzeScenario) -> None:
         raise ScenarioError(
             f"hunt.speed={scenario.hunt.speed}: expected 0 together with a recording"
         )
+    check_wrist(scenario)
     if scenario.recording:
         load_recording(scenario.recording)
     points = {
