@@ -57,6 +57,8 @@ class GauzeScenario(Scenario, WristSettings):
             comparison; else they find them from the shafts' lines.
         behaviour: Form of "go to target": "bypass" (attract or bypass), or "field"
             (the paper's sum of potentials, see `go_to_target.form`).
+        time_ratio: Whether the run is repeated without O to give the figure
+            `time_ratio`.
         hunt: O chases the robot's shaft, if its speed is not 0.
         measure_from: Force figures of the wrist start here [s].
     """
@@ -68,6 +70,7 @@ class GauzeScenario(Scenario, WristSettings):
     robot: RobotTool = field(default_factory=RobotTool)
     target: SurgeonToolParams = field(default_factory=SurgeonToolParams)
     obstacle: SurgeonToolParams = field(default_factory=SurgeonToolParams)
+    time_ratio: bool = False
     hunt: Hunt = field(default_factory=Hunt)
     camera: EndoscopeParams = field(default_factory=EndoscopeParams)
     tracker: OpticalTrackerParams = field(default_factory=OpticalTrackerParams)
@@ -112,9 +115,8 @@ def check(scenario: GauzeScenario) -> None:
         if hasattr(part, "check"):
             part.check()
     if scenario.behaviour not in BEHAVIOURS:
-        raise ScenarioError(
-            f"behaviour={scenario.behaviour!r}: {nearest(scenario.behaviour, BEHAVIOURS)}"
-        )
+        hint = nearest(scenario.behaviour, BEHAVIOURS)
+        raise ScenarioError(f"behaviour={scenario.behaviour!r}: {hint}")
     if scenario.hunt.speed and scenario.recording:
         raise ScenarioError(
             f"hunt.speed={scenario.hunt.speed}: expected 0 together with a recording"

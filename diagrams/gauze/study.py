@@ -41,7 +41,7 @@ SIGNALS: dict[str, tuple[str, ...]] = {
     "planner.v_R": XYZ,
     "planner.v_safe": XYZ,
     "planner.clearance": ("room", "near", "condition", "dodge", "change", "missed"),
-    "planner.way": ("way", "waiting", "aim_x", "aim_y", "aim_z"),
+    "planner.way": ("way", "waiting", "aim_x", "aim_y", "aim_z", "switches"),
     "navigation.tool": (
         *SHAFT,
         *(f"v_{axis}" for axis in XYZ),

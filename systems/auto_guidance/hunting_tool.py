@@ -1,7 +1,7 @@
 """A surgeon's tool that chases the robot's shaft: the worst that O can do.
 
 Nobody operates like this. It is there to test what is promised: the robot keeps clear
-of a tool that always comes for it, as long as it is not faster than the robot can evade.
+of a tool that always comes for it, as long as the robot can evade faster than it comes.
 """
 
 from dataclasses import dataclass

@@ -162,13 +162,14 @@ def _step(
     camera: np.ndarray,
     view_cone: np.ndarray,
 ) -> np.ndarray:
-    """The next state (6), v_1 (3), the guide signal (12) and the way (5)."""
+    """The next state (7), v_1 (3), the guide signal (12) and the way (6)."""
     params = record[0]
     v_tip, dt = xyz(state, 0), time - state[3]
     g, p, p_s = xyz(robot_tool, 0), xyz(robot_tool, 3), xyz(target, 0)
     stop = limited((-v_tip[0], -v_tip[1], -v_tip[2]), params.max_acceleration * dt)
     v_tip_stopping = along(v_tip, 1.0, stop)
     edge, is_waiting, aim = int(state[4]), state[5] > 0.5, p
+    switches = state[6]
     if not all_finite(robot_tool):
         zero = (0.0, 0.0, 0.0)
         guide: tuple[float, ...] = zero + zero + (0.0, 1.0, 1.0) + zero
@@ -179,6 +180,7 @@ def _step(
     else:
         guide = guide_point(robot_tool, obstacle, p_s, params.proportion_floor)
         if usable(obstacle) and usable(target) and all_finite(view_cone):
+            before = edge
             tools = obstacle_tools(margins[0], g, obstacle, target, camera)
             v_tip, edge, is_waiting, aim = bypass(
                 params,
@@ -194,12 +196,14 @@ def _step(
                 edge,
                 is_waiting,
             )
+            if before > 0 and edge > 0 and edge != before:
+                switches += 1.0
         else:
             v_tip = v_tip_stopping
     v1 = along((0.0, 0.0, 0.0), guide[7], v_tip)
     waits = 1.0 if is_waiting else 0.0
-    memory = (time, float(edge), waits)
-    way = (float(edge), waits) + aim
+    memory = (time, float(edge), waits, switches)
+    way = (float(edge), waits) + aim + (switches,)
     return np.array(v_tip + memory + v1 + guide + way)
 
 
@@ -217,11 +221,12 @@ class ToolBypass(Block):
     Port ``v1`` emits the guide point's velocity v_1 (3), m/s, in W.
     Port ``guide`` emits the guide signal (12): M_R, M_O, rho, s, l/L, M_R^f.
     Port ``way`` emits the way in use (0 straight, -1 up and over, 1 and 2 the top and
-    the tip edge of O, then of S and of the endoscope), 1 while R waits, and where it
-    goes to (5), m, in W.
+    the tip edge of O, then of S and of the endoscope), 1 while R waits, where it goes
+    to, m, in W, and how often it has gone from one edge to another (6).
 
-    The discrete state is v_1 / s (3), the time of the last update, the way in use and
-    whether R waits. The outputs are those of the step from then to now.
+    The discrete state is v_1 / s (3), the time of the last update, the way in use,
+    whether R waits, and the changes of edge. The outputs are those of the step from
+    then to now.
     """
 
     def __init__(
@@ -254,16 +259,16 @@ class ToolBypass(Block):
             self.vector_in("camera", CAMERA_EXAMPLE),
             self.vector_in("view_cone", VIEW_CONE_EXAMPLE),
         ]
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -params.period, 0.0, 0.0]))
+        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -params.period] + [0.0] * 3))
         inputs = {port.ticket() for port in self._inputs}
         self._step = self.cached(
             "step", self._calc_step, inputs | {self.xd_ticket(), self.time_ticket()}
         )
         step_ticket = {self._step.ticket()}
-        self.vector_out("v1", 3, lambda c: self._step.Eval(c)[6:9], step_ticket)
-        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[9:21], step_ticket)
-        self.vector_out("way", 5, lambda c: self._step.Eval(c)[21:], step_ticket)
-        self.update_every(params.period, lambda c: self._step.Eval(c)[:6])
+        self.vector_out("v1", 3, lambda c: self._step.Eval(c)[7:10], step_ticket)
+        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[10:22], step_ticket)
+        self.vector_out("way", 6, lambda c: self._step.Eval(c)[22:], step_ticket)
+        self.update_every(params.period, lambda c: self._step.Eval(c)[:7])
 
     def _calc_step(self, context: Any) -> np.ndarray:
         return _step(
