@@ -3,7 +3,7 @@
 Half-spaces, a ball of speed, and a cylinder of turning speed: a small convex program in
 three unknowns. Dykstra's algorithm solves it by projecting on one set after the other;
 unlike projecting in turn alone it ends at the *nearest* feasible point. Where the sets
-have no point in common it ends between them, the last ones, the speeds, being kept.
+have no point in common it ends between them, the speeds being kept.
 """
 
 from math import sqrt
@@ -16,6 +16,8 @@ from systems.common.geometry import Vector, along, dot, limited, norm, sub
 TOLERANCE = 1e-7
 """Of a velocity, m/s."""
 MOST_ROUNDS = 200
+_LITTLE = 1e-4
+"""What slow convergence leaves, m/s: less than this is no contradiction."""
 
 
 @compiled
@@ -44,6 +46,15 @@ def onto_limits(v: Vector, u: Numbers, speed: float, turning: float) -> Vector:
         scale * across[1] + kept * u[1],
         scale * across[2] + kept * u[2],
     )
+
+
+@compiled
+def most_missed(v: Numbers, rows: np.ndarray, bounds: np.ndarray) -> float:
+    """By how much v misses the row it misses most, m/s; 0 if none."""
+    missed = 0.0
+    for i in range(len(bounds)):
+        missed = max(missed, bounds[i] - dot(rows[i], v))
+    return missed
 
 
 @compiled
@@ -78,6 +89,7 @@ def nearest_velocity(
     v = wanted
     for _ in range(MOST_ROUNDS):
         before = v
+        between, active = (0.0, 0.0, 0.0), 0
         for i in range(count):
             if squares[i] < 1e-12:
                 continue
@@ -89,16 +101,21 @@ def nearest_velocity(
             v = (x + step * rows[i, 0], y + step * rows[i, 1], z + step * rows[i, 2])
             corrections[i, 0], corrections[i, 1] = x - v[0], y - v[1]
             corrections[i, 2] = z - v[2]
+            if short > 0.0:
+                between, active = along(between, 1.0, v), active + 1
         shifted = along(v, 1.0, last)
         v = onto_limits(shifted, u, speed, turning)
         last = sub(shifted, v)
-        missed = 0.0
-        for i in range(count):
-            short = bounds[i] - dot(rows[i], v)
-            missed = max(missed, short)
+        missed = most_missed(v, rows, bounds)
         if missed < TOLERANCE and norm(sub(v, before)) < TOLERANCE:
             return v, 0.0
-    return v, missed
+    if missed < _LITTLE or active < 2:
+        return v, missed
+    # Rows against each other: as much of one as of the other is given up.
+    share = 1.0 / active
+    middle = (share * between[0], share * between[1], share * between[2])
+    v = onto_limits(middle, u, speed, turning)
+    return v, most_missed(v, rows, bounds)
 
 
 @compiled

@@ -104,7 +104,7 @@ def test_dynamic_surgeon_of_figure_8():
 
 
 def test_push_aside():
-    r = run("gauze_push")
+    r = paper("gauze_push")
     time, error = r.signals["time"], tip_error(r)
     v = r.matrix("navigation.tool")[:, 6:9]
     v_O = r.matrix("obstacle.tip_velocity")
