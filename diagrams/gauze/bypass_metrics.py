@@ -58,7 +58,7 @@ def bypass_figures(
     if run.scenario.behaviour == "bypass":
         way = run.matrix("planner.way")
         figures["edge_switches"] = round(way[-1, 5])
-        figures["waiting_time"] = float(np.mean(way[:, 1]) * time[-1])
+        figures["waiting_time"] = float(np.mean(way[:, 1] > 0.0) * time[-1])
     if run.scenario.time_ratio and arrival:
         alone = time_without_obstacle(run.scenario)
         figures["time_ratio"] = arrival / alone if alone else None

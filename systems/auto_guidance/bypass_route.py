@@ -38,7 +38,7 @@ _SLACK = 1e-4
 """How much nearer to a tool than now a leg may lead where R is near already, m."""
 _HALVINGS = 12
 
-type Choice = tuple[Vector, float, int, bool, Vector]
+type Choice = tuple[Vector, float, int, int, Vector]
 
 
 @compiled
@@ -104,7 +104,7 @@ def choose_way(
     goal: Vector,
     tools: np.ndarray,
     edge: int,
-    is_waiting: bool,
+    waits: int,
 ) -> Choice:
     """The way of R's tip at this instant.
 
@@ -117,27 +117,31 @@ def choose_way(
         goal: The target, m.
         tools: Obstacle tools (n, 11), see `shadow_body`.
         edge: The way in use: STRAIGHT, OVER, or an edge's number.
-        is_waiting: Whether R waits.
+        waits: Number of the pose that R waits in, 0 if it does not wait.
 
     Returns:
-        Unit direction of the tip, length of the way in m, the way's number, whether R
-        waits or goes to wait, and where it goes (the target, or a pose to wait in).
+        Unit direction of the tip, length of the way in m, the way's number, that of
+        the pose to wait in, and where it goes (the target, or a pose to wait in).
     """
     count = len(tools)
-    room = params.freed_room if is_waiting else params.blocked_room
-    is_waiting = False
+    room = params.freed_room if waits else params.blocked_room
+    is_blocked = False
     for i in range(count):
         if pose_distance(tools[i], g, goal) < tools[i, SAFE] + room:
-            is_waiting = True
-    if is_waiting:
-        goal = waiting_pose(params, workspace, view_cone, g, p, goal, tools)
+            is_blocked = True
+    if is_blocked:
+        goal, waits = waiting_pose(
+            params, workspace, view_cone, g, p, goal, tools, waits
+        )
+    else:
+        waits = 0
     keep = np.empty(count)
     for i in range(count):
         rho = pose_distance(tools[i], g, goal) - params.goal_slack
         keep[i] = max(tools[i, SAFE] + params.goal_slack, min(tools[i, PLAN], rho))
     way = sub(goal, p)
     if is_free(tools, keep, -1, g, p, goal):
-        return unit(way), norm(way), STRAIGHT, is_waiting, goal
+        return unit(way), norm(way), STRAIGHT, waits, goal
     # Where R is nearer already, a leg is held to lead no nearer.
     legs = np.empty(count)
     for i in range(count):
@@ -166,10 +170,10 @@ def choose_way(
         if length < least:
             best, least, direction = number, length, toward
     if kept < 1e8 and least > params.switch_ratio * kept - params.switch_gain:
-        return kept_direction, kept, edge, is_waiting, goal
+        return kept_direction, kept, edge, waits, goal
     if best != OVER and (edge != OVER or count == 1):
-        return direction, least, best, is_waiting, goal
+        return direction, least, best, waits, goal
     over, length = up_and_over(tools, legs, workspace.min_insertion, g, p, goal)
     if least < params.switch_ratio * length - params.switch_gain:
-        return direction, least, best, is_waiting, goal
-    return over, length, OVER, is_waiting, goal
+        return direction, least, best, waits, goal
+    return over, length, OVER, waits, goal

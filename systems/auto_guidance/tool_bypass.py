@@ -116,8 +116,8 @@ def bypass(
     v_goal: Vector,
     tools: np.ndarray,
     edge: int,
-    is_waiting: bool,
-) -> tuple[Vector, int, bool, Vector]:
+    waits: int,
+) -> tuple[Vector, int, int, Vector]:
     """One step of the behaviour.
 
     Args:
@@ -132,21 +132,21 @@ def bypass(
         v_goal: Its velocity, m/s.
         tools: Obstacle tools (n, 11).
         edge: The way in use.
-        is_waiting: Whether R waits.
+        waits: Number of the pose that R waits in, 0 if it does not wait.
 
     Returns:
-        The tip's velocity after the step in m/s, the way in use, whether R waits, and
-        where it goes to.
+        The tip's velocity after the step in m/s, the way in use, the pose that R waits
+        in, and where it goes to.
     """
-    direction, length, edge, is_waiting, aim = choose_way(
-        params, workspace, view_cone, g, p, goal, tools, edge, is_waiting
+    direction, length, edge, waits, aim = choose_way(
+        params, workspace, view_cone, g, p, goal, tools, edge, waits
     )
     speed = min(params.max_speed, params.approach_rate * length)
     wanted = along((0.0, 0.0, 0.0), speed, direction)
-    if not is_waiting:
+    if waits == 0:
         wanted = limited(along(wanted, 1.0, v_goal), params.max_speed)
     change = limited(sub(wanted, v_tip), params.max_acceleration * dt)
-    return along(v_tip, 1.0, change), edge, is_waiting, aim
+    return along(v_tip, 1.0, change), edge, waits, aim
 
 
 @compiled
@@ -168,7 +168,7 @@ def _step(
     g, p, p_s = xyz(robot_tool, 0), xyz(robot_tool, 3), xyz(target, 0)
     stop = limited((-v_tip[0], -v_tip[1], -v_tip[2]), params.max_acceleration * dt)
     v_tip_stopping = along(v_tip, 1.0, stop)
-    edge, is_waiting, aim = int(state[4]), state[5] > 0.5, p
+    edge, waits, aim = int(state[4]), int(state[5]), p
     switches = state[6]
     if not all_finite(robot_tool):
         zero = (0.0, 0.0, 0.0)
@@ -182,7 +182,7 @@ def _step(
         if usable(obstacle) and usable(target) and all_finite(view_cone):
             before = edge
             tools = obstacle_tools(margins[0], g, obstacle, target, camera)
-            v_tip, edge, is_waiting, aim = bypass(
+            v_tip, edge, waits, aim = bypass(
                 params,
                 workspace[0],
                 view_cone,
@@ -194,16 +194,15 @@ def _step(
                 velocity(target),
                 tools,
                 edge,
-                is_waiting,
+                waits,
             )
             if before > 0 and edge > 0 and edge != before:
                 switches += 1.0
         else:
             v_tip = v_tip_stopping
     v1 = along((0.0, 0.0, 0.0), guide[7], v_tip)
-    waits = 1.0 if is_waiting else 0.0
-    memory = (time, float(edge), waits, switches)
-    way = (float(edge), waits) + aim + (switches,)
+    memory = (time, float(edge), float(waits), switches)
+    way = (float(edge), float(waits)) + aim + (switches,)
     return np.array(v_tip + memory + v1 + guide + way)
 
 
@@ -221,12 +220,13 @@ class ToolBypass(Block):
     Port ``v1`` emits the guide point's velocity v_1 (3), m/s, in W.
     Port ``guide`` emits the guide signal (12): M_R, M_O, rho, s, l/L, M_R^f.
     Port ``way`` emits the way in use (0 straight, -1 up and over, 1 and 2 the top and
-    the tip edge of O, then of S and of the endoscope), 1 while R waits, where it goes
-    to, m, in W, and how often it has gone from one edge to another (6).
+    the tip edge of O, then of S and of the endoscope), the number of the pose that R
+    waits in, 0 if it does not wait, where it goes to, m, in W, and how often it has
+    gone from one edge to another (6).
 
-    The discrete state is v_1 / s (3), the time of the last update, the way in use,
-    whether R waits, and the changes of edge. The outputs are those of the step from
-    then to now.
+    The discrete state is v_1 / s (3), the time of the last update, the way in use, the
+    pose that R waits in, and the changes of edge. The outputs are those of the step
+    from then to now.
     """
 
     def __init__(

@@ -6,7 +6,7 @@ its tip. Of those that are free of all tools and within the workspace the best i
 the target, and a little near to R; one that R cannot go to straight counts as farther.
 """
 
-from math import asin, cos, sin
+from math import asin, cos, isfinite, sin
 from typing import Any
 
 import numpy as np
@@ -81,22 +81,25 @@ def waiting_pose(
     p: Vector,
     goal: Vector,
     tools: np.ndarray,
-) -> Vector:
-    """The pose (R's tip) to wait in, m.
+    in_use: int,
+) -> tuple[Vector, int]:
+    """The pose (R's tip) to wait in, m, and its number.
 
     Args:
-        params: A record with `waiting_room`: how far off D_safe it is, m.
+        params: A record of `tool_bypass.constants`.
         workspace: A record of `workspace.constants`.
         view_cone: Apex, axis, half angle (7).
         g: Fulcrum G_R, m.
         p: Tip of R, m.
         goal: The target, in the shadow of a tool or several, m.
         tools: Obstacle tools (n, 11).
+        in_use: Number of the pose in use, 0 if none. It is kept until another is
+            better by `switch_gain`, so that noise does not make R change its mind.
     """
     count = len(tools)
     shaft = sub(goal, g)
     depth, u = norm(shaft), unit(shaft)
-    poses = np.zeros((1 + 3 * count, 3))
+    poses = np.full((1 + 3 * count, 3), np.nan)
     # (i) In front of every tool.
     first = depth
     for i in range(count):
@@ -104,7 +107,6 @@ def waiting_pose(
         keep = tool[SAFE] + params.waiting_room
         a, p_o = xyz(tool, FULCRUM), xyz(tool, TIP)
         first = min(first, free_depth(g, u, a, p_o, keep) - 1e-6)
-    found = 1
     pose = along(g, first, u)
     for axis in range(3):
         poses[0, axis] = pose[axis]
@@ -129,22 +131,23 @@ def waiting_pose(
             angle = least_turn(tool, g, start, way, depth, keep)
             pose = along(g, depth, turned(start, way, angle))
             for axis in range(3):
-                poses[found, axis] = pose[axis]
-            found += 1
-    best, least = along(g, 1.0, sub(p, g)), 1e9
-    for k in range(found):
+                poses[1 + 3 * i + k, axis] = pose[axis]
+    best, number, least = along(g, 1.0, sub(p, g)), len(poses) + 1, 1e9
+    for k in range(len(poses)):
         pose = xyz(poses[k], 0)
-        if not is_inside(workspace, view_cone, g, pose):
+        if not isfinite(pose[0]) or not is_inside(workspace, view_cone, g, pose):
             continue
+        is_kept = k + 1 == in_use
         cost = norm(sub(pose, goal)) + _NEARNESS * norm(sub(pose, p))
+        room = params.waiting_room
+        slack = -room if is_kept else 0.8 * room
         for i in range(count):
-            if (
-                pose_distance(tools[i], g, pose)
-                < tools[i, SAFE] + 0.5 * params.waiting_room
-            ):
+            if pose_distance(tools[i], g, pose) < tools[i, SAFE] + slack:
                 cost = 1e9
-            elif way_distance(tools[i], g, p, pose) < tools[i, SAFE]:
+            elif not is_kept and way_distance(tools[i], g, p, pose) < tools[i, SAFE]:
                 cost += _DETOUR
+        if is_kept and cost < 1e8:
+            cost -= params.switch_gain
         if cost < least:
-            best, least = pose, cost
-    return best
+            best, number, least = pose, k + 1, cost
+    return best, number

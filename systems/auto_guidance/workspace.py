@@ -80,9 +80,10 @@ def line_in_cone(
     b = ma * da - c2 * dot(m, d)
     c = ma * ma - c2 * dot(m, m)
     discriminant = b * b - k * c
-    if discriminant < 0.0 or abs(k) < 1e-15:
+    if abs(k) < 1e-15 or (k < 0.0 and discriminant < 0.0):
         return 1.0, 0.0
-    root = sqrt(discriminant)
+    # Along a line steeper than the cone it is negative by rounding only.
+    root = sqrt(max(0.0, discriminant))
     first, second = (-b - root) / k, (-b + root) / k
     low, high = min(first, second), max(first, second)
     if k < 0.0:  # between the roots, on the side the axis points to

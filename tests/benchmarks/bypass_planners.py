@@ -51,13 +51,13 @@ class Bypass(LocalPlanner):
     def __post_init__(self) -> None:
         super().__post_init__()
         self._bypass = tool_bypass.constants(self.bypass)[0]
-        self.edge, self.is_waiting, self.edge_switches = 0, False, 0
+        self.edge, self.waits, self.edge_switches = 0, 0, 0
         self.aim: Vector = (0.0, 0.0, 0.0)
 
     def _go_to_target(self, dt, robot_tool, obstacle, target, others):
         g, p, goal = (tuple(x) for x in (robot_tool[:3], robot_tool[3:], target[:3]))
         edge = self.edge
-        v_tip, self.edge, self.is_waiting, self.aim = tool_bypass.bypass(
+        v_tip, self.edge, self.waits, self.aim = tool_bypass.bypass(
             self._bypass,
             _ROOM,
             NO_CONE,
@@ -69,7 +69,7 @@ class Bypass(LocalPlanner):
             (0.0, 0.0, 0.0),
             around(obstacle, others),
             edge,
-            self.is_waiting,
+            self.waits,
         )
         self.edge_switches += edge > 0 and self.edge > 0 and edge != self.edge
         return v_tip, guide_point(

@@ -44,7 +44,7 @@ def test_crossed_is_passed_where_the_paper_stalls():
     assert not stalled.metrics["reached"] and not stalled.metrics["contact"]
     speed = np.linalg.norm(stalled.matrix("navigation.tool")[:, 6:9], axis=1)
     assert stalled.metrics["final_tip_error"] > 0.02
-    assert speed[-30:].max() < 0.005  # it stands there
+    assert speed[-30:].max() < 0.01  # it stands there
     held = run("crossed", "behaviour=field", "time_ratio=false")
     assert not held.metrics["reached"] and not held.metrics["contact"]
 

@@ -29,16 +29,16 @@ def tools(*pairs) -> np.ndarray:
     return rows
 
 
-def chosen(p, goal, rows, edge=STRAIGHT, is_waiting=False):
+def chosen(p, goal, rows, edge=STRAIGHT, waits=0):
     """The way at one instant, in a workspace without borders."""
-    return choose_way(RECORD, _ROOM, NO_CONE, G, p, goal, rows, edge, is_waiting)
+    return choose_way(RECORD, _ROOM, NO_CONE, G, p, goal, rows, edge, waits)
 
 
 def test_a_free_way_is_straight_and_a_crossed_one_goes_over_an_edge():
     p, goal = (-0.05, 0.0, -0.06), (0.05, 0.0, -0.06)
     aside = tools(((0.0, 0.1, 0.0), (0.0, 0.05, -0.05)))
     direction, length, edge, waits, aim = chosen(p, goal, aside)
-    assert (edge, waits, aim) == (STRAIGHT, False, goal)
+    assert (edge, waits, aim) == (STRAIGHT, 0, goal)
     assert direction == pytest.approx((1.0, 0.0, 0.0)) and length == pytest.approx(0.1)
     across = tools(((0.0, 0.1, 0.0), (0.0, -0.03, -0.055)))
     _, length, edge, waits, _ = chosen(p, goal, across)
@@ -67,7 +67,7 @@ def test_where_no_edge_will_do_it_retracts_turns_and_inserts():
         ((0.008, -0.15, -0.01), (0.008, 0.12, -0.058)),
         ((-0.008, -0.15, -0.02), (-0.008, 0.12, -0.062)),
     )
-    edge, waits, met = STRAIGHT, False, set()
+    edge, waits, met = STRAIGHT, 0, set()
     for _ in range(4000):
         direction, length, edge, waits, _ = chosen(p, goal, fence, edge, waits)
         met.add(edge)
@@ -99,7 +99,7 @@ def test_it_waits_at_a_free_pose_near_the_target():
             given.p_WPs,
             row,
             STRAIGHT,
-            False,
+            0,
         )
         assert waits
         rho = geometry.closest_points(given.p_WGr, aim, a, tip)[2]
