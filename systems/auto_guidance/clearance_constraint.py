@@ -11,11 +11,11 @@ obstacle tool, together with the tip's and the turning speed and the borders of 
 workspace; v is the nearest velocity to the wanted one.
 
 *The promise and its condition.* If rho >= D_safe at the start and at every instant n .
-v_O(M_O) <= e, e being the greatest A . v that the speeds allow, the constraint can be
-kept, and rho >= D_safe for ever (continuous time, exact states, velocity followed).
-Where M_R is inside the shaft, n is perpendicular to u: only turning evades, and e = s
-min(v_max, q omega_max); near G_R it is small. Port ``status`` says whether the
-condition holds while a tool is near enough to matter.
+v_O(M_O) <= e, e being the greatest A . v that the speeds and the workspace allow, the
+constraint can be kept, and rho >= D_safe for ever (continuous time, exact states,
+velocity followed). Where M_R is inside the shaft, n is perpendicular to u: only turning
+evades, and e = s min(v_max, q omega_max); near G_R it is small. Port ``status`` says
+whether the condition holds while a tool is near enough to matter.
 
 *Dodge.* If a tool closes on the inside of the shaft with more than 0.6 e and there is
 little time left to pull the tip out of its way, R retracts until it closes with less
@@ -68,6 +68,8 @@ _PARALLEL = 0.2
 """Sine of the angle below which a tip's own distance is constrained as well."""
 _OUTWARDS = 0.05
 """Share of insertion in A above which retracting would bring R nearer to the tool."""
+_MISSED = 1e-3
+"""A row is missed by more than the solver's own error, m/s."""
 _ROWS = 14
 TOOLS = 3
 """Most obstacle tools: O, S, endoscope."""
@@ -237,11 +239,20 @@ def constrain(
     dodges = np.zeros(TOOLS)
     status = np.array([1e9, 0.0, 1.0, 0.0, 0.0, 0.0])
     near = params.obstacle_speed / params.rate
+    inwards, room = borders(workspace, view_cone, g, p)
+    # A tip that is outside comes back no faster than it may go at all.
+    least = np.minimum(-params.rate * room, 0.25 * params.max_speed)
     last = 0
     for i in range(len(tools)):
         rho, s, row, closing, is_parallel = distance_rate(g, p, tools[i])
         safe = tools[i, SAFE]
         evasion = greatest_rate(row, u, params.max_speed, turning)
+        if rho - safe < near:
+            far = along((0.0, 0.0, 0.0), 100.0 * params.max_speed, row)
+            best, _ = nearest_velocity(
+                far, inwards, least, u, params.max_speed, turning
+            )
+            evasion = max(0.0, min(evasion, dot(row, best)))
         if rho - safe < status[0]:
             status[0] = rho - safe
         if rho - safe < near:
@@ -273,18 +284,19 @@ def constrain(
             -params.max_speed * u[2],
         )
     if params.active:
-        inwards, room = borders(workspace, view_cone, g, p)
         for i in range(5):
             for axis in range(3):
                 rows[last, axis] = inwards[i, axis]
-            # A tip that is outside comes back no faster than it may go at all.
-            bounds[last] = min(-params.rate * room[i], 0.25 * params.max_speed)
+            bounds[last] = least[i]
             last += 1
         v, missed = nearest_velocity(
             wanted, rows[:last], bounds[:last], u, params.max_speed, turning
         )
         status[4] = norm(sub(v, wanted))
         status[5] = missed
+        # Several tools may ask for what cannot be had together.
+        if missed > _MISSED:
+            status[2] = 0.0
         wanted = v
     return wanted, dodges, status
 
