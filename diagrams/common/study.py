@@ -9,6 +9,7 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 
 STUDIES = {
     "gauze": "diagrams.gauze.study",
+    "navigation": "diagrams.navigation.study",
     "wrist": "diagrams.wrist.study",
     "snake": "diagrams.resection.snake_study",
 }

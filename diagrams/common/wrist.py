@@ -125,7 +125,10 @@ def add_wrist(
     ]
     sensor = replace(scenario.tool_wrench, seed=scenario.seed)
     estimator = replace(
-        scenario.fulcrum_estimator, guess=guess, length=scenario.instrument.length
+        scenario.fulcrum_estimator,
+        guess=guess,
+        length=scenario.instrument.length,
+        latency=sensor.delay * sensor.period if sensor.aligned else 0.0,
     )
     wrist = replace(scenario.passive_wrist, mode=scenario.wrist, guess=guess)
     systems = {

@@ -45,6 +45,7 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
     off = run.signals["wall.fulcrum_error"]
     spatial, across, squared = estimate_errors(run)
     late = time >= start - 1e-9
+    wrist = run.scenario.passive_wrist
     scale = run.signals["wrist.permission.speed_scale"]
     code = np.round(run.signals["wrist.permission.code"])
     figures: dict[str, Any] = {
@@ -52,7 +53,8 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
         "rms_lateral_force": rms(force[late]),
         "max_lateral_force": float(force[late].max(initial=0.0)),
         "max_lateral_force_ever": float(force.max()),
-        "time_over_5N": float(np.mean(force > 5.0) * (time[-1] - time[0])),
+        "time_over_warning": float(np.mean(force > wrist.warning_force) * time[-1]),
+        "time_over_limit": float(np.mean(force > wrist.force_limit) * time[-1]),
         "rms_fulcrum_error": rms(off[late]),
         "max_fulcrum_error": float(off[late].max(initial=0.0)),
         "rms_estimate_error": rms(spatial[late]),

@@ -39,8 +39,13 @@ def forces(runs: Mapping[str, Any], start: float) -> Figure:
         upper.semilogy(time, np.maximum(force, drawn), label=label, **style)
         off = run.signals["wall.fulcrum_error"] * MM
         lower.semilogy(time, np.maximum(off, drawn), **style)
-    upper.axhline(5.0, color="k", lw=0.6, ls="--")
-    upper.text(time[-1], 5.4, "force limit", fontsize=8, ha="right")
+    limits = next(iter(runs.values())).scenario.passive_wrist
+    for bound, name in (
+        (limits.force_limit, "force limit"),
+        (limits.warning_force, "warning"),
+    ):
+        upper.axhline(bound, color="k", lw=0.6, ls="--")
+        upper.text(time[-1], 1.06 * bound, name, fontsize=7, ha="right")
     for axes in (upper, lower):
         axes.axvline(start, color=COLORS["muted"], lw=0.8, ls=":")
         axes.set_xlim(0.0, time[-1])

@@ -12,10 +12,16 @@ METRES_PER_NEWTON = 0.03
 
 
 def draw_point(
-    meshcat: Any, animation: Any, path: str, times: Any, points: Any, rgba: Any
+    meshcat: Any,
+    animation: Any,
+    path: str,
+    times: Any,
+    points: Any,
+    radius: float,
+    rgba: Any,
 ) -> None:
-    """A small ball that moves along `points` (n, 3) [m]."""
-    meshcat.SetObject(path, Sphere(0.006), Rgba(*rgba))
+    """A ball that moves along `points` (n, 3) [m]; wider than the trocar's tube."""
+    meshcat.SetObject(path, Sphere(radius), Rgba(*rgba))
     for index in range(0, len(times), 4):
         frame = animation.frame(times[index])
         animation.SetTransform(frame, path, RigidTransform(points[index]))
@@ -26,10 +32,11 @@ def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
     time = run.signals["time"]
     true = run.matrix("wall.fulcrum")[:, :3]
     believed = run.matrix("wrist.pivot")
-    draw_point(meshcat, animation, "true_fulcrum", time, true, (0.16, 0.62, 0.3, 0.9))
-    draw_point(
-        meshcat, animation, "believed_fulcrum", time, believed, (0.55, 0.2, 0.75, 0.9)
-    )
+    for path, points, radius, rgba in (
+        ("true_fulcrum", true, 0.013, (0.16, 0.7, 0.3, 0.4)),
+        ("believed_fulcrum", believed, 0.008, (0.6, 0.15, 0.8, 1.0)),
+    ):
+        draw_point(meshcat, animation, path, time, points, radius, rgba)
     draw_arrow(
         meshcat,
         animation,

@@ -21,7 +21,7 @@ WIRES = (
     ("arc_navigation.tool", "passive_wrist.tool_wanted"),
     ("joint_commands.set_point", "plant.pa10_desired_state"),
     ("plant.pa10_state", "robot_location.arm_state"),
-    ("fulcrum_estimator.fulcrum", "robot_location.fulcrum"),
+    ("passive_wrist.pivot", "robot_location.fulcrum"),
 )
 
 EXPORTS = WRIST_EXPORTS | {

@@ -38,5 +38,5 @@ STUDY = Study(
     controller="passive_wrist",
     adjust=stiffen,
     required=("system", "duration", "wrist", "robot.p_WG", "robot.p_WP"),
-    view=View(camera=(0.5, -0.62, 0.16), target=(0.0, 0.0, -0.02)),
+    view=View(camera=(0.3, -0.42, 0.14), target=(0.0, 0.0, 0.0)),
 )

@@ -3,14 +3,12 @@
 The algorithm stands in `fulcrum_tracker`, the filter in `fulcrum_filter`.
 """
 
-from collections.abc import Sequence
-from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from systems.common.block import Block
-from systems.passive_wrist.fulcrum_filter import FulcrumParams, Sample
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
 
 __all__ = ["FulcrumEstimator", "FulcrumParams"]
@@ -29,8 +27,6 @@ class FulcrumEstimator(Block):
 
     Port ``wrench`` accepts the wall's force on the shaft [N], its moment about the
     sensor's origin [N m], and 1 if the sensor is alive (7).
-
-    Port ``fulcrum`` emits the fulcrum p_WI predicted to now (3), in W [m].
 
     Port ``estimate`` emits p_WI [m] and v_WI [m/s] now, sigma across the shaft and
     along it [m], stiffness [N/m], sigma of its logarithm, breathing rate [Hz, 0 if
@@ -59,7 +55,6 @@ class FulcrumEstimator(Block):
         }
         self._posterior = self.cached("posterior", self._calc_posterior, read)
         after = {self._posterior.ticket(), self.time_ticket()}
-        self.vector_out("fulcrum", 3, self._calc_fulcrum, after)
         self.vector_out("estimate", 14, self._calc_estimate, after)
         self.vector_out("covariance", 9, self._calc_covariance, after)
         self.update_every(self._p.period, self._posterior.Eval)
@@ -70,45 +65,12 @@ class FulcrumEstimator(Block):
         time = context.get_time()
         if time - state[self._time] < 0.5 * self._p.period:
             return state.copy()
-        w = self._wrench.Eval(context).tolist()
-        s = self._shaft.Eval(context).tolist()
-        if w[6] > 0.5 and isfinite(sum(w)) and isfinite(sum(s)):
-            u, v, du, length = s[3:6], s[6:9], s[9:12], self._p.length
-            v_WP = [v[k] + length * du[k] for k in (0, 1, 2)]
-            turning = self._tracker.filter.turning(u, v_WP)
-            sample = Sample(
-                s[0:3], u, v, du, w[0:3], w[3:6], self._p.damping, turning=turning
-            )
-            z = self._tracker.step(state, sample)
-        else:
-            z = self._tracker.coast(state)
-        z[self._time] = time
-        return z
+        shaft, wrench = self._shaft.Eval(context), self._wrench.Eval(context)
+        return self._tracker.step(state, shaft, wrench, time)
 
-    def _ahead(self, context: Any, z: np.ndarray) -> tuple[list[float], list[float]]:
-        return self._tracker.ahead(z, max(0.0, context.get_time() - z[self._time]))
-
-    def _calc_fulcrum(self, context: Any) -> Sequence[float]:
-        return self._ahead(context, self._posterior.Eval(context))[0]
-
-    def _calc_estimate(self, context: Any) -> Sequence[float]:
-        z = self._posterior.Eval(context)
-        tracker = self._tracker
-        p, v = self._ahead(context, z)
-        across, along = tracker.spread(z, self._shaft.Eval(context)[3:6])
-        stiffness, sigma = tracker.stiffness(z)
-        return [
-            *p,
-            *v,
-            across,
-            along,
-            stiffness,
-            sigma,
-            tracker.breathing(z),
-            z[tracker.at("phase")],
-            z[tracker.at("jumps")],
-            z[tracker.at("refused")],
-        ]
+    def _calc_estimate(self, context: Any) -> Any:
+        z, u = self._posterior.Eval(context), self._shaft.Eval(context)[3:6]
+        return self._tracker.report(z, u, context.get_time())
 
     def _calc_covariance(self, context: Any) -> Any:
         return self._tracker.covariance(self._posterior.Eval(context)).reshape(-1)

@@ -7,12 +7,13 @@ every (a_k, b_k) by k omega T. The measurement is `wall_model`'s, linearised.
 """
 
 from dataclasses import dataclass, field
-from math import cos, exp, log, pi, sin, sqrt
+from math import cos, exp, log, pi, sin
 
 import numpy as np
 
 from systems.passive_wrist import fulcrum_kernels as kernels
-from systems.passive_wrist.wall_model import Vector, dot, lateral_basis
+from systems.passive_wrist.fulcrum_step import to_first_force
+from systems.passive_wrist.wall_model import Vector
 
 
 @dataclass
@@ -45,6 +46,8 @@ class FulcrumParams:
             1/sqrt(s).
         axial_ratio: Prior of the unseen axial breathing over the lateral one.
         neighbourhood: The fulcrum is never farther from the guess, in m.
+        latency: How old force and pose are when they arrive, in s; the estimate is
+            predicted over it.
         period: Of the updates, in s.
     """
 
@@ -67,7 +70,8 @@ class FulcrumParams:
     wall_walk: float = 5e-3
     amplitude_walk: float = 0.03
     axial_ratio: float = 2.0
-    neighbourhood: float = 0.06
+    neighbourhood: float = 0.08
+    latency: float = 0.0
     period: float = 1.0 / 120.0
 
     def check(self) -> None:
@@ -92,7 +96,7 @@ class FulcrumParams:
                 raise ValueError(
                     f"fulcrum estimator: {name}={getattr(self, name)} must be > 0"
                 )
-        for name in ("damping", "force_bias", "moment_bias", "pose_noise"):
+        for name in ("damping", "force_bias", "moment_bias", "pose_noise", "latency"):
             if not 0.0 <= getattr(self, name) < float("inf"):
                 raise ValueError(
                     f"fulcrum estimator: {name}={getattr(self, name)} must be >= 0"
@@ -139,9 +143,7 @@ class Sample:
     turning: float = 1.0
 
     def __post_init__(self) -> None:
-        """Takes the lateral force, and packs all for the kernels."""
-        self.e1, self.e2 = lateral_basis(self.u)
-        self.f1, self.f2 = dot(self.e1, self.f), dot(self.e2, self.f)
+        """Packs all for the kernels."""
         self.packed = np.array(
             [
                 *self.p_WS,
@@ -231,29 +233,9 @@ class FulcrumFilter:
                 v[j] -= w * (a * s + b * c)
         return p, v
 
-    def turning(self, u: Vector, v_WP: Vector) -> float:
-        """Weight of what the shaft's angle says of the depth, from the tip's v."""
-        along = dot(u, v_WP)
-        return ramp(sqrt(max(dot(v_WP, v_WP) - along**2, 0.0)), self.p.depth_speed)
-
-    def to_first_force(self, x: np.ndarray, P: np.ndarray, a: Sample) -> None:
+    def to_first_force(self, x: np.ndarray, P: np.ndarray, a: np.ndarray) -> None:
         """Puts the mean on the line that a force implies; its depth is kept."""
-        n = self.n
-        stiffness = exp(x[n - 1])
-        depth = sum(a.u[i] * (x[i] - a.p_WS[i]) for i in (0, 1, 2))
-        offset = np.array(
-            [(a.f1 * a.e1[i] + a.f2 * a.e2[i]) / stiffness for i in (0, 1, 2)]
-        )
-        U = np.outer(a.u, a.u)
-        noise = (self.p.force_noise / stiffness) ** 2 + self.p.pose_noise**2
-        x[:3] = np.asarray(a.p_WS) + depth * np.asarray(a.u) + offset
-        # An unknown stiffness leaves the offset along the force unknown with it.
-        sigma2 = P[n - 1, n - 1]
-        P[:3, :] = 0.0
-        P[:, :3] = 0.0
-        P[:3, :3] = self.p.guess_sigma**2 * U + noise * (np.eye(3) - U)
-        P[:3, :3] += sigma2 * np.outer(offset, offset)
-        P[:3, n - 1] = P[n - 1, :3] = -sigma2 * offset
+        to_first_force(x, P, a, self.p.guess_sigma, self._noise)
 
     def predict(
         self,
@@ -328,21 +310,3 @@ class FulcrumFilter:
         )
         if not sound:
             raise ValueError("fulcrum estimator: the record cannot be filtered again")
-
-    def jump(self, x: np.ndarray, P: np.ndarray, a: Sample, size: float) -> None:
-        """The wall has jumped by about `size` m: fits the mean alone, iterated."""
-        P[(0, 1, 2), (0, 1, 2)] += size**2
-        prior = x[:3].copy()
-        for _ in range(4):
-            i = self.innovate(x, P, a)
-            # The innovation seen from the prior, linearised at the iterate.
-            i.y = i.y + i.H[:, 0:3].dot(x[:3] - prior)
-            x[:3] = prior + i.gain[:3].dot(i.y)
-        x[:3] = prior
-        i.axial = 1.0
-        self.update(x, P, i, 3)
-
-
-def ramp(value: float, start: float) -> float:
-    """0 up to `start`, 1 from twice that on."""
-    return min(max(value / start - 1.0, 0.0), 1.0)

@@ -16,23 +16,30 @@ Three decisions keep it consistent where a plain extended Kalman filter is not:
   over, the second opens the mean's covariance, and only the mean is updated.
 """
 
-from math import dist, exp, hypot, log, pi, sqrt
+from math import exp, log, pi, sqrt
 
 import numpy as np
 
+from systems.common.compiled import packed
 from systems.passive_wrist.breathing_rate import BreathingFit, find_breathing
-from systems.passive_wrist.fulcrum_filter import FulcrumFilter, FulcrumParams, Sample
-from systems.passive_wrist.fulcrum_kernels import add_to_record, sample_of, spread
+from systems.passive_wrist.fulcrum_filter import FulcrumFilter, FulcrumParams
+from systems.passive_wrist.fulcrum_kernels import sample_of, spread
+from systems.passive_wrist.fulcrum_step import (
+    AUX,
+    BREATHING,
+    LEAST_BREATHING,
+    RECORD,
+    WIDTH,
+    advance,
+    report,
+)
 
-BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0  # phases
-_RECORD = 120  # entries of the record
 _RECORD_PERIOD = 0.1  # [s]
 _CHECK = 3  # entries between two looks for the breathing
 _SHORTEST = 28  # entries before the first look
 _STILL = 50  # entries without motion that make a still wall
-_UNLIKELY = 30.0  # normalised innovation squared of a jump
 _EXPECTED = 1.5  # smoothed innovations up to which the wall is understood
-_GUARD = 0.1  # s after a jump in which only the mean is updated
+_DUE = AUX.index("due")
 
 
 class FulcrumTracker:
@@ -42,38 +49,29 @@ class FulcrumTracker:
     of the angle of a tenth of a second), the sums for its next entry (13), the
     scalars `AUX`, and each harmonic's rms in m when the breathing was found.
 
+    The scalars: phase; steps so far; unlikely samples in a row; s of guard left after
+    a jump; nis, smoothed normalised innovation squared / 4 (1 = as expected); entries
+    recorded; looks in a row that agreed on a rate; the rate found, in Hz; jumps
+    followed; estimates refused; lateral force in N; walk of the mean once the wall is
+    understood, in m/sqrt(s); samples summed; time of the last update in s; 1 if an
+    entry was just added.
+
     Attributes:
         filter: Prediction and updates.
         size: Length of z.
     """
-
-    AUX = (
-        "phase",
-        "steps",  # updates so far
-        "unlikely",  # unlikely samples in a row
-        "guard",  # s left after a jump
-        "nis",  # smoothed normalised innovation squared / 4, 1 = as expected
-        "recorded",  # entries of the record
-        "agreed",  # looks in a row that found the same rate
-        "found",  # that rate, in Hz
-        "jumps",  # jumps followed so far
-        "refused",  # estimates refused so far
-        "force",  # lateral force of the last sample, in N
-        "walk",  # of the mean, from what the breathing's fit left, in m/sqrt(s)
-        "summed",  # samples in the sums
-        "time",  # of the last update, in s; kept for the block
-    )
 
     def __init__(self, params: FulcrumParams) -> None:
         self.filter = FulcrumFilter(params)
         self.p = params
         n = self.filter.n
         self._record = n + n * n
-        self._sums = self._record + 13 * _RECORD
-        self._aux = self._sums + 13
-        self._parts = self._aux + len(self.AUX)
+        self._sums = self._record + WIDTH * RECORD
+        self._aux = self._sums + WIDTH
+        self._parts = self._aux + len(AUX)
         self.size = self._parts + params.harmonics
         self._every = max(1, round(_RECORD_PERIOD / params.period))
+        self._constants = packed(params, every=float(self._every))
 
     def initial(self) -> np.ndarray:
         """The state before the first sample, shape (size,)."""
@@ -85,7 +83,7 @@ class FulcrumTracker:
 
     def at(self, name: str) -> int:
         """Index in z of a scalar named in `AUX`."""
-        return self._aux + self.AUX.index(name)
+        return self._aux + AUX.index(name)
 
     def mean(self, z: np.ndarray) -> np.ndarray:
         """The filter's state x, a view into z."""
@@ -103,6 +101,11 @@ class FulcrumTracker:
         P.reshape(-1)[::4] += bias**2
         return P
 
+    def report(self, z: np.ndarray, u: np.ndarray, time: float) -> np.ndarray:
+        """The estimate as a vector (14); see `FulcrumEstimator`'s port."""
+        vector: np.ndarray = report(self._constants, z, u, time)
+        return vector
+
     def spread(self, z: np.ndarray, u: np.ndarray) -> tuple[float, float]:
         """Standard deviations of the fulcrum across a shaft and along it, in m."""
         n = self.filter.n
@@ -117,7 +120,7 @@ class FulcrumTracker:
 
     def breathing(self, z: np.ndarray) -> float:
         """Rate in Hz; zero while there is no breathing to see."""
-        if z[self.at("phase")] < BREATHING or z[self._parts] < 2e-4:
+        if z[self.at("phase")] < BREATHING or z[self._parts] < LEAST_BREATHING:
             return 0.0
         return exp(z[self.filter.n - 2]) / (2.0 * pi)
 
@@ -125,85 +128,27 @@ class FulcrumTracker:
         """Fulcrum and its velocity `time` s after the last update."""
         return self.filter.ahead(z[: self.filter.n], time)
 
-    def step(self, z: np.ndarray, sample: Sample) -> np.ndarray:
-        """One update; `z` is not changed, the new state is returned."""
-        z = z.copy()
-        p, f = self.p, self.filter
-        n = f.n
-        x, aux = z[:n], z[self._aux : self._parts]
-        P = z[n : self._record].reshape(n, n)
-        force = aux[10] = hypot(sample.f1, sample.f2)
-        aux[1] += 1.0
-        if aux[0] == BEFORE:
-            f.to_first_force(x, P, sample)
-            aux[0] = FOLLOWING
-            return z
-        guard = aux[3] > 0.0
-        known = aux[0] == BREATHING
-        walk = aux[11] * min(max(aux[4], 1.0), 10.0) if known else p.wall_walk
-        if guard:
-            aux[3] -= p.period
-            walk = 0.05  # the rest of a jump that takes more than two samples
-        f.predict(x, P, p.period, walk, self._part_walks(z), known)
-        i = f.innovate(x, P, sample)
-        nis = i.nis
-        if nis > _UNLIKELY and not guard:
-            aux[2] += 1.0
-            if aux[2] < 2.0:
-                return z  # coasted over: one unlikely sample
-            size = 1.5 * hypot(i.y[0], i.y[1]) / exp(x[n - 1])
-            f.jump(x, P, sample, min(0.02, size))
-            aux[2], aux[3], aux[5], aux[8] = 0.0, _GUARD, 0.0, aux[8] + 1.0
-        else:
-            aux[2] = 0.0
-            aux[4] += 0.02 * (min(nis, 60.0) / 4.0 - aux[4])
-            f.update(x, P, i, 3 if guard else n if force > p.learn_above else n - 1)
-        self._remember(z, sample, i.w)
-        if (
-            dist(f.total.dot(x).tolist(), p.guess) > p.neighbourhood
-        ):  # refused: starts anew
-            aux[9] += 1.0
-            aux[0], aux[3], aux[5], aux[6] = FOLLOWING, 0.0, 0.0, 0.0
-            x[:3], x[3 : n - 2] = p.guess, 0.0
-            P[: n - 1, :] = P[:, : n - 1] = 0.0
-            f.to_first_force(x, P, sample)
-        return z
+    def step(
+        self, z: np.ndarray, shaft: np.ndarray, wrench: np.ndarray, time: float = 0.0
+    ) -> np.ndarray:
+        """One update; `z` is not changed, the new state is returned.
 
-    def coast(self, z: np.ndarray) -> np.ndarray:
-        """One period without a reading."""
-        z = z.copy()
-        f = self.filter
-        n = f.n
+        Args:
+            z: The state.
+            shaft: p_WS [m], u, v_WS [m/s], du [1/s] (12).
+            wrench: f [N], m [N m], and 1 if they are valid (7).
+            time: In s.
+        """
+        z = advance(self._constants, z, shaft, wrench, time)
         aux = z[self._aux : self._parts]
-        if aux[0] != BEFORE:
-            known = aux[0] == BREATHING
-            walk = aux[11] if known else self.p.wall_walk
-            parts = self._part_walks(z)
-            P = z[n : self._record].reshape(n, n)
-            f.predict(z[:n], P, self.p.period, walk, parts, known)
-            aux[5], aux[12] = 0.0, 0.0  # a record must have no gaps
-            z[self._sums : self._aux] = 0.0
+        third = aux[1] // self._every % _CHECK == 0
+        if aux[_DUE] == 1.0 and aux[5] >= _SHORTEST and third:
+            record = z[self._record : self._sums].reshape(RECORD, WIDTH)
+            self._look(z, record[RECORD - int(aux[5]) :])
         return z
 
     def _part_walks(self, z: np.ndarray) -> np.ndarray:
         return self.p.amplitude_walk * np.maximum(z[self._parts :], 3e-4)
-
-    def _remember(self, z: np.ndarray, a: Sample, w: np.ndarray) -> None:
-        """Adds a sample to the record and looks for the breathing in it."""
-        sums = z[self._sums : self._aux]
-        add_to_record(sums, z[: self.filter.n], a.packed, w)
-        aux = z[self._aux : self._parts]
-        aux[12] += 1.0
-        if aux[12] < self._every:
-            return
-        record = z[self._record : self._sums].reshape(_RECORD, 13)
-        record[:-1] = record[1:]
-        record[-1] = sums / aux[12]
-        sums[:], aux[12] = 0.0, 0.0
-        aux[5] = min(aux[5] + 1.0, _RECORD)
-        entries = aux[1] // self._every
-        if aux[5] >= _SHORTEST and entries % _CHECK == 0.0:
-            self._look(z, record[_RECORD - int(aux[5]) :])
 
     def _look(self, z: np.ndarray, record: np.ndarray) -> None:
         """Looks for the breathing, or for a still wall, in the record."""
@@ -267,7 +212,7 @@ class FulcrumTracker:
         x[:3] = z[:3] if aux[0] == BREATHING else p.guess
         x[n - 2] = log(2.0 * pi * (fit.rate if fit else 0.25))
         P[n - 2, n - 2] = 0.05**2
-        f.to_first_force(x, P, self._entry(record[0]))
+        f.to_first_force(x, P, sample_of(record[0], self._every))
         u = record[0, 3:6]
         U = np.outer(u, u)
         z[self._parts :] = fit.parts if fit else 0.0
@@ -288,13 +233,6 @@ class FulcrumTracker:
         z[:n], z[n : self._record] = x, P.reshape(-1)
         aux[0], aux[4], aux[6] = BREATHING, 1.0, 0.0
 
-    def _entry(self, row: np.ndarray) -> Sample:
-        """An entry of the record as a sample."""
-        a = sample_of(row, self._every).tolist()
-        return Sample(
-            a[0:3], a[3:6], a[6:9], a[9:12], a[12:15], a[15:18], 0.0, self._every, a[20]
-        )
-
 
 def believable(fit: BreathingFit, entries: int, noise: float) -> bool:
     """Whether a fitted wave is more than noise, and not a piece of a slower one.
@@ -304,9 +242,11 @@ def believable(fit: BreathingFit, entries: int, noise: float) -> bool:
         entries: Length of its record.
         noise: Standard deviation of the record's noise, in m.
     """
-    clear = 2.5 if entries == _RECORD else 4.0
+    clear = 2.5 if entries == RECORD else 4.0
     if fit.amplitude < max(2e-4, 3.0 * noise, clear * fit.residual):
         return False
+    if len(fit.parts) > 1 and fit.parts[1] > 0.8 * fit.parts[0]:
+        return False  # half the rate: of a breath the first harmonic is the largest
     breaths = fit.rate * entries * _RECORD_PERIOD
     # A sharp wave seen for less than a breath fits a quicker one nearly as well.
     return breaths > 1.3 or fit.residual < 0.04 * fit.amplitude + 1.5 * noise

@@ -15,22 +15,27 @@ The law stands in `wrist_law`.
 """
 
 from collections.abc import Sequence
-from math import isfinite
 from typing import Any
+
+import numpy as np
 
 from systems.common.block import Block
 from systems.passive_wrist.wrist_law import (
     FROZEN,
     SCALE,
-    WristInput,
-    WristLaw,
+    TIME,
     WristParams,
+    command,
+    constants,
+    initial,
+    next_state,
 )
 
 __all__ = ["PassiveWristEmulation", "WristParams"]
 
 FREE, LOADED, SENSOR_LOST, PROBING = 0.0, 8.0, 9.0, 10.0
 """Why the task must wait, as on port `permission`."""
+_NOWHERE = np.zeros(6)
 
 
 class PassiveWristEmulation(Block):
@@ -68,8 +73,8 @@ class PassiveWristEmulation(Block):
     def __init__(self, params: WristParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
-        self._p = params or WristParams()
-        self._law = WristLaw(self._p)
+        p = self._p = params or WristParams()
+        self._constants = constants(p)
         down = [0.0, 0.0, -1.0]
         self._wanted = self.vector_in(
             "tool_wanted", [0.0, 0.0, -0.18, *down, *[0.0] * 6, 0.0]
@@ -81,8 +86,7 @@ class PassiveWristEmulation(Block):
             [*[0.0] * 6, 1e-4, 1e-3, 500.0, 0.1, 0.0, 1.0, 0.0, 0.0],
         )
         self._truth = self.vector_in("true_fulcrum", [0.0] * 6)
-        # State: the law's, and the time of its last update.
-        self._state = self.DeclareDiscreteState([*self._law.initial(), -self._p.period])
+        self._state = self.DeclareDiscreteState(initial(p))
         read = {
             self.xd_ticket(),
             self.time_ticket(),
@@ -104,55 +108,34 @@ class PassiveWristEmulation(Block):
         self.vector_out("pivot", 3, self._calc_pivot, {self._next.ticket()})
         self.update_every(self._p.period, self._next.Eval)
 
-    def _calc_next(self, context: Any) -> list[float]:
+    def _calc_next(self, context: Any) -> np.ndarray:
         """The law's state with this instant's inputs, once and only once."""
-        state = context.get_discrete_state(self._state).value().tolist()
+        state: np.ndarray = context.get_discrete_state(self._state).value()
         time = context.get_time()
-        if time - state[-1] < 0.5 * self._p.period:
-            return state
-        tool = self._wanted.Eval(context).tolist()
-        s = self._shaft.Eval(context).tolist()
-        w = self._wrench.Eval(context).tolist()
-        e = self._estimate.Eval(context).tolist()
-        lag = time - tool[12]
-        p_WI, v_WI = e[0:3], e[3:6]
-        if self._p.mode == "known":
-            truth = self._truth.Eval(context).tolist()
-            p_WI, v_WI = truth[0:3], truth[3:6]
-        if not isfinite(sum(tool)):  # hold still; the navigation says why
-            tool[0:3], tool[6:9] = state[6:9], [0.0] * 3
-            lag = 0.0
-        ahead = self._p.horizon
-        given = WristInput(
-            [tool[k] + lag * tool[6 + k] for k in (0, 1, 2)],
-            tool[6:9],
-            s[0:3],
-            s[3:6],
-            w[0:3],
-            w[6] > 0.5 and isfinite(sum(w)),
-            [p_WI[k] + ahead * v_WI[k] for k in (0, 1, 2)],
-            v_WI,
-            stiffness=e[8],
-            stiffness_sigma=e[9],
-            sigma_across=e[6],
-            sigma_along=e[7],
+        if time - state[TIME] < 0.5 * self._p.period:
+            return state.copy()
+        told = self._p.mode == "known"
+        after: np.ndarray = next_state(
+            self._constants,
+            state,
+            self._wanted.Eval(context),
+            self._shaft.Eval(context),
+            self._wrench.Eval(context),
+            self._estimate.Eval(context),
+            self._truth.Eval(context) if told else _NOWHERE,
+            time,
         )
-        return [*self._law.step(state[:-1], given), time]
+        return after
 
-    def _calc_tool(self, context: Any) -> Sequence[float]:
-        state = self._next.Eval(context)
-        v_WP = self._wanted.Eval(context)[6:9].tolist()
-        if not isfinite(sum(v_WP)):
-            v_WP = [0.0] * 3
-        return [*self._law.pose(state, v_WP), state[-1]]
+    def _calc_tool(self, context: Any) -> Any:
+        return command(self._next.Eval(context), self._wanted.Eval(context))
 
     def _calc_permission(self, context: Any) -> Sequence[float]:
         state = self._next.Eval(context)
-        frozen = state[FROZEN]
+        frozen, scale = state[FROZEN], state[SCALE]
         if frozen:
             return [0.0, LOADED if frozen == 1.0 else SENSOR_LOST]
-        scale = state[SCALE]
         return [scale, FREE if scale > 0.0 else PROBING]
 
-    def _calc_pivot(self, context: Any) -> Sequence[float]:
+    def _calc_pivot(self, context: Any) -> Any:
         return self._next.Eval(context)[0:3]

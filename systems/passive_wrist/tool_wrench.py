@@ -31,6 +31,7 @@ from systems.passive_wrist import sensor_noise
 from systems.passive_wrist.wrench_kernel import shaft_of, wall_wrench
 
 _SILENCE = [0.0] * 7
+_UPRIGHT = [0.0, 0.0, 0.22, 0.0, 0.0, -1.0, *[0.0] * 6]
 
 
 @dataclass
@@ -51,6 +52,9 @@ class ToolWrenchParams:
         force_range: Beyond it a force axis is saturated, in N.
         moment_range: Beyond it a moment axis is saturated, in N m.
         delay: Samples that the wrench is late against the pose.
+        aligned: Whether the shaft's pose is held back by as much, so that the two
+            belong together; what is late is then predicted. A few milliseconds
+            between force and pose cost more than the delay itself.
         lost: Times in s between which the sensor is silent: start, end, start, ...
         period: Of the readings, in s.
         seed: Of the noise.
@@ -68,6 +72,7 @@ class ToolWrenchParams:
     force_range: float = 60.0
     moment_range: float = 5.0
     delay: int = 0
+    aligned: bool = True
     lost: list[float] = field(default_factory=list)
     period: float = 1.0 / 120.0
     seed: int = 0
@@ -235,13 +240,18 @@ class ToolWrench(Block):
             self._accelerations.ticket(),
             self.time_ticket(),
         }
-        self.vector_out("shaft", 12, self._shaft_vector, {self._shaft.ticket()})
         if p.delay:
-            self._late = self.DeclareDiscreteState(np.zeros(7 * p.delay))
-            self.vector_out("wrench", 7, self._oldest, {self.xd_ticket()})
+            # Rows of shaft and wrench, the oldest first; silent before the start.
+            start = np.tile([*_UPRIGHT, *_SILENCE], p.delay)
+            self._late = self.DeclareDiscreteState(start)
+            self.vector_out("wrench", 7, self._oldest_wrench, {self.xd_ticket()})
             self.update_every(p.period, self._push)
         else:
             self.vector_out("wrench", 7, self._calc_wrench, feeling)
+        if p.delay and p.aligned:
+            self.vector_out("shaft", 12, self._oldest_shaft, {self.xd_ticket()})
+        else:
+            self.vector_out("shaft", 12, self._shaft_vector, {self._shaft.ticket()})
 
     def _calc_shaft(self, context: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The port's vector, angular velocity, and R_WM."""
@@ -282,12 +292,16 @@ class ToolWrench(Block):
             sleeve,
         )
 
-    def _oldest(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(self._late).value()[:7]
+    def _oldest_shaft(self, context: Any) -> Any:
+        return context.get_discrete_state(self._late).value()[:12]
+
+    def _oldest_wrench(self, context: Any) -> Any:
+        return context.get_discrete_state(self._late).value()[12:19]
 
     def _push(self, context: Any) -> Any:
         late = context.get_discrete_state(self._late).value()
-        return np.concatenate([late[7:], self._calc_wrench(context)])
+        now = self._shaft_vector(context), self._calc_wrench(context)
+        return np.concatenate([late[19:], *now])
 
 
 def add_tool_wrench(

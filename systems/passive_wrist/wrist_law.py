@@ -1,4 +1,4 @@
-"""The emulation's law over plain floats: pivot, probe, freeze, speed (section 3).
+"""The emulation's law, compiled: pivot, probe, freeze, speed (section 3).
 
 A free wrist turns until its moment vanishes, so its shaft points from the task's
 tip P through the fulcrum I: with the estimate I^ (its remaining force is already
@@ -18,9 +18,13 @@ Around it lie three guards, all kept in one small state vector:
 """
 
 from dataclasses import dataclass
-from math import dist, exp, hypot, pi, sqrt
+from math import exp, hypot, pi, sqrt
 
-from systems.passive_wrist.wall_model import Vector, dot, lateral_basis
+import numpy as np
+
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import dot, norm, sub, xyz
+from systems.passive_wrist.wall_model import lateral_basis
 
 MODES = ("pwe", "spring", "off", "known")
 PROBE_OFF, PROBE_ON, PROBE_BACK = 0.0, 1.0, 2.0
@@ -37,6 +41,7 @@ PROBED = 21  # s of probing
 DONE = 22  # 1 once the probe is over
 FREEZES = 23  # so far
 SCALE = 24  # share of the task's speed
+TIME = 25  # of the last update, in s
 
 
 @dataclass
@@ -120,209 +125,205 @@ class WristParams:
             )
 
 
-@dataclass
-class WristInput:
-    """What the law reads at one instant; vectors in W, SI units.
+SIZE = 26
+"""Length of the law's state: pivot (3), its velocity (3), commanded tip (3), filtered
+spring offset (3), the scalars whose places are named above, and the time."""
 
-    Attributes:
-        p_WP: Task's tip now.
-        v_WP: Its velocity.
-        p_WS: Sensor's origin.
-        u: Shaft's unit vector.
-        f: The wall's force on the shaft.
-        valid: Whether the sensor is alive and not saturated.
-        p_WI: The fulcrum `horizon` ahead (estimated, or true for `known`).
-        v_WI: Its velocity.
-        stiffness: Believed stiffness.
-        stiffness_sigma: Standard deviation of its logarithm.
-        sigma_across: Of the estimate across the shaft.
-        sigma_along: Of the estimate along the shaft.
+_basis = compiled(lateral_basis)
+_PWE, _SPRING, _OFF, _KNOWN = range(4)  # places in MODES
+Floats = np.ndarray
+
+
+def initial(params: WristParams) -> np.ndarray:
+    """The law's state before the first update."""
+    state = np.zeros(SIZE)
+    state[WAY], state[TIME] = 1.0, -params.period
+    return state
+
+
+def constants(params: WristParams) -> np.ndarray:
+    """The parameters as the compiled law takes them.
+
+    Raises:
+        ValueError: If one of them makes no sense.
     """
-
-    p_WP: Vector
-    v_WP: Vector
-    p_WS: Vector
-    u: Vector
-    f: Vector
-    valid: bool
-    p_WI: Vector
-    v_WI: Vector
-    stiffness: float
-    stiffness_sigma: float
-    sigma_across: float
-    sigma_along: float
+    params.check()
+    first = np.array(params.guess or [0.0, 0.0, 0.0])
+    return packed(params, code=float(MODES.index(params.mode)), first=first)
 
 
-class WristLaw:
-    """The law; everything it remembers is a list of `size` floats.
+@compiled
+def _watch(s: Floats, c, force: float, valid: bool) -> None:  # type: ignore[no-untyped-def]
+    """Freezes and releases the task."""
+    dt = c.period
+    s[OVER] = s[OVER] + dt if valid and force > c.force_limit else 0.0
+    s[SILENT] = 0.0 if valid else s[SILENT] + dt
+    s[CALM] = s[CALM] + dt if valid and force < c.release_force else 0.0
+    if s[FROZEN] != 0.0:
+        if s[CALM] >= c.release_time:
+            s[FROZEN] = 0.0
+    elif s[OVER] >= c.force_limit_time:
+        s[FROZEN] = 1.0
+        s[FREEZES] += 1.0
+    elif s[SILENT] > c.sensor_timeout:
+        s[FROZEN] = 2.0
+        s[FREEZES] += 1.0
 
-    Layout: pivot (3), its velocity (3), commanded tip (3), filtered spring
-    offset (3), and the scalars whose places are named above.
+
+@compiled
+def _spring(s: Floats, c, shaft: Floats, f: Floats, valid: bool) -> Floats:  # type: ignore[no-untyped-def]
+    """The printed law: the first guess's depth, the force over a fixed stiffness."""
+    u = shaft[3:6]
+    share = 1.0 - exp(-2.0 * pi * c.spring_bandwidth * c.period) if valid else 0.0
+    push = f[0] * u[0] + f[1] * u[1] + f[2] * u[2]
+    depth = 0.0
+    for k in range(3):
+        offset = (f[k] - push * u[k]) / c.spring_stiffness
+        s[9 + k] += share * (offset - s[9 + k])
+        depth += u[k] * (c.first[k] - shaft[k])
+    return shaft[0:3] + depth * u + s[9:12]
+
+
+@compiled
+def _probe(s: Floats, c, u: Floats, f: Floats, estimate: Floats):  # type: ignore[no-untyped-def]
+    """The probing move: what it adds to the pivot and to its velocity."""
+    dt = c.period
+    if s[PROBE] == PROBE_OFF:
+        s[PROBE] = PROBE_ON if estimate[9] > 0.3 else PROBE_BACK
+    s[PROBED] += dt
+    if (estimate[9] < 0.15 and estimate[7] < 1.5e-3) or s[PROBED] > c.probe_time:
+        s[PROBE] = PROBE_BACK
+    e, _ = _basis(u)
+    speed = min(c.probe_speed, c.probe_force_rate / estimate[8])
+    offset, way, move = s[OFFSET], s[WAY], 0.0
+    back = -(f[0] * e[0] + f[1] * e[1] + f[2] * e[2])
+    if s[PROBE] == PROBE_BACK:
+        move = max(-speed * dt, min(speed * dt, -offset))
+        if offset + move == 0.0:
+            s[DONE] = 1.0
+    elif back * way >= c.probe_force or offset * way >= c.probe_travel:
+        s[DWELL] += dt
+        if s[DWELL] > 0.1:
+            s[WAY], s[DWELL] = -way, 0.0
+    else:
+        move = way * speed * dt
+    s[OFFSET] = offset + move
+    side = np.array(e)
+    return s[OFFSET] * side, move / dt * side
+
+
+@compiled
+def _move_pivot(s: Floats, c, target: Floats, velocity: Floats, ratio: float) -> None:  # type: ignore[no-untyped-def]
+    """Moves the pivot to its target within the wrist's limits.
+
+    What is fed forward is the target's own velocity: a difference of two estimates
+    would send their noise twice. Only while the pivot cannot keep up it is the
+    pivot's.
     """
+    dt = c.period
+    fastest, hardest = c.wrist_speed * ratio, c.wrist_acceleration * ratio
+    error = sub(xyz(target, 0), xyz(s, 0))
+    over = (
+        error[0] / dt - velocity[0],
+        error[1] / dt - velocity[1],
+        error[2] / dt - velocity[2],
+    )
+    excess = norm(over)
+    if excess <= max(hardest * dt, 0.2 * fastest):  # keeps up
+        s[0:3], s[3:6] = target, velocity
+        return
+    # Approaches no faster than it can brake, than the wrist may move, and than it
+    # can speed up.
+    share = min(1.0, sqrt(2.0 * hardest * norm(error)) / excess)
+    wanted = velocity + share * np.array(over)
+    speed = norm(xyz(wanted, 0))
+    if speed > fastest:
+        wanted = wanted * (fastest / speed)
+    change = wanted - s[3:6]
+    size = norm(xyz(change, 0))
+    s[3:6] += min(1.0, hardest * dt / max(size, 1e-12)) * change
+    s[0:3] += s[3:6] * dt
 
-    size = 25
 
-    def __init__(self, params: WristParams) -> None:
-        params.check()
-        self.p = params
+@compiled
+def next_state(
+    law: Floats,
+    old: Floats,
+    tool: Floats,
+    shaft: Floats,
+    wrench: Floats,
+    estimate: Floats,
+    truth: Floats,
+    time: float,
+) -> Floats:
+    """The law's next state.
 
-    def initial(self) -> list[float]:
-        """The state before the first update."""
-        state = [0.0] * self.size
-        state[WAY] = 1.0
-        return state
-
-    def step(self, state: list[float], i: WristInput) -> list[float]:
-        """The next state."""
-        s = list(state)
-        p = self.p
-        dt = p.period
-        force = sqrt(max(dot(i.f, i.f) - dot(i.f, i.u) ** 2, 0.0))
-        self._watch(s, force, i.valid)
-        target, velocity = self._pivot(s, i)
-        if p.mode == "pwe" and p.probe:
-            target, velocity = self._probe(s, i, target, velocity)
-        if s[STARTED] == 0.0:
-            s[0:3], s[3:6], s[6:9] = target, velocity, i.p_WP
-            s[STARTED] = 1.0
+    Args:
+        law: What `constants` returns.
+        old: State (26).
+        tool: The task's p_WP, u, v_WP, du and their time (13).
+        shaft: p_WS, u, v_WS, du (12).
+        wrench: f, m, and 1 if they are valid (7).
+        estimate: As the fulcrum estimator emits it (14).
+        truth: The true p_WI and v_WI (6), for `known`.
+        time: In s.
+    """
+    c = law[0]
+    s = old.copy()
+    s[TIME] = time
+    p_WP, v_WP = s[6:9].copy(), np.zeros(3)  # hold still without a number
+    if np.isfinite(tool).all():
+        p_WP, v_WP = tool[0:3] + (time - tool[12]) * tool[6:9], tool[6:9].copy()
+    valid = bool(wrench[6] > 0.5 and np.isfinite(wrench).all())
+    u, f = shaft[3:6], wrench[0:3] if valid else np.zeros(3)
+    push = dot(xyz(f, 0), xyz(u, 0))
+    force = sqrt(max(dot(xyz(f, 0), xyz(f, 0)) - push**2, 0.0))
+    _watch(s, c, force, valid)
+    seen = truth if c.code == _KNOWN else estimate
+    target, velocity = seen[0:3] + c.horizon * seen[3:6], seen[3:6].copy()
+    if c.code == _OFF or c.code == _SPRING:
+        velocity[:] = 0.0
+        if c.code == _OFF:
+            target[:] = c.first
         else:
-            reach, length = dist(i.p_WP, s[0:3]), dist(i.p_WP, i.p_WS)
-            ratio = max(reach / max(length, 1e-3), 0.1)
-            self._move_pivot(s, target, velocity, ratio)
-        if s[FROZEN] == 0.0:
-            # The tip goes back to its task no faster than the wrist may move.
-            away = [i.p_WP[k] - s[6 + k] for k in (0, 1, 2)]
-            far = sqrt(dot(away, away))
-            step = (sqrt(dot(i.v_WP, i.v_WP)) * 1.5 + 0.2 * p.wrist_speed) * dt
-            share = 1.0 if far <= step else step / far
-            for k in (0, 1, 2):
-                s[6 + k] += share * away[k]
-        s[SCALE] = self._scale(s, i)
-        return s
+            target[:] = _spring(s, c, shaft, f, valid)
+    if c.code == _PWE and c.probe and s[DONE] == 0.0 and valid:
+        more, faster = _probe(s, c, u, f, estimate)
+        target, velocity = target + more, velocity + faster
+    if s[STARTED] == 0.0:
+        s[0:3], s[3:6], s[6:9], s[STARTED] = target, velocity, p_WP, 1.0
+    else:
+        reach = norm(sub(xyz(p_WP, 0), xyz(s, 0)))
+        length = norm(sub(xyz(p_WP, 0), xyz(shaft, 0)))
+        ratio = max(reach / max(length, 1e-3), 0.1)
+        _move_pivot(s, c, target, velocity, ratio)
+    if s[FROZEN] == 0.0:
+        # The tip goes back to its task no faster than the wrist may move.
+        away = p_WP - s[6:9]
+        far = norm(xyz(away, 0))
+        step = (norm(xyz(v_WP, 0)) * 1.5 + 0.2 * c.wrist_speed) * c.period
+        s[6:9] += (1.0 if far <= step else step / far) * away
+    probing = s[PROBE] != PROBE_OFF and s[DONE] == 0.0
+    s[SCALE] = 1.0
+    if s[FROZEN] != 0.0 or (c.code == _PWE and probing):
+        s[SCALE] = 0.0
+    elif c.code == _PWE:
+        doubt = hypot(estimate[6] / c.sure_across, estimate[7] / c.sure_along)
+        s[SCALE] = max(c.slowest, 1.0 / max(doubt, 1.0))
+    return s
 
-    def pose(self, state: list[float], v_WP: Vector) -> list[float]:
-        """Desired instrument: p_WP, u_W, v_WP, du_W (12)."""
-        pivot, dpivot, tip = state[0:3], state[3:6], state[6:9]
-        frozen = state[FROZEN] != 0.0
-        v = [0.0, 0.0, 0.0] if frozen else list(v_WP)
-        away = [tip[k] - pivot[k] for k in (0, 1, 2)]
-        reach = sqrt(dot(away, away))
-        u = [a / reach for a in away]
-        turn = [v[k] - dpivot[k] for k in (0, 1, 2)]
-        along = dot(turn, u)
-        du = [(turn[k] - along * u[k]) / reach for k in (0, 1, 2)]
-        return [*tip, *u, *v, *du]
 
-    def _pivot(self, s: list[float], i: WristInput) -> tuple[list[float], list[float]]:
-        """Where the mode wants the pivot."""
-        p = self.p
-        still = [0.0, 0.0, 0.0]
-        guess = p.guess or [0.0, 0.0, 0.0]
-        if p.mode == "off":
-            return list(guess), still
-        if p.mode == "spring":
-            share = 1.0 - exp(-2.0 * pi * p.spring_bandwidth * p.period)
-            along = dot(i.f, i.u)
-            for k in (0, 1, 2):
-                offset = (i.f[k] - along * i.u[k]) / p.spring_stiffness
-                s[9 + k] += share * (offset - s[9 + k])
-            depth = sum(i.u[k] * (guess[k] - i.p_WS[k]) for k in (0, 1, 2))
-            return [i.p_WS[k] + depth * i.u[k] + s[9 + k] for k in (0, 1, 2)], still
-        return list(i.p_WI), list(i.v_WI)
-
-    def _move_pivot(
-        self, s: list[float], target: Vector, velocity: Vector, ratio: float
-    ) -> None:
-        """Moves the pivot to its target within the wrist's limits.
-
-        What is fed forward is the target's own velocity: a difference of two
-        estimates would send their noise twice. Only while the pivot cannot keep up
-        it is the pivot's.
-        """
-        p, dt = self.p, self.p.period
-        fastest = p.wrist_speed * ratio
-        hardest = p.wrist_acceleration * ratio
-        error = [target[k] - s[k] for k in (0, 1, 2)]
-        over = [error[k] / dt - velocity[k] for k in (0, 1, 2)]
-        excess = sqrt(dot(over, over))
-        braking = sqrt(2.0 * hardest * sqrt(dot(error, error)))
-        if excess <= max(hardest * dt, 0.2 * fastest):  # keeps up
-            s[0:3], s[3:6] = target, velocity
-            return
-        # Approaches no faster than it can brake, than the wrist may move, and than
-        # it can speed up.
-        share = min(1.0, braking / excess)
-        wanted = [velocity[k] + share * over[k] for k in (0, 1, 2)]
-        speed = sqrt(dot(wanted, wanted))
-        if speed > fastest:
-            wanted = [w * fastest / speed for w in wanted]
-        change = [wanted[k] - s[3 + k] for k in (0, 1, 2)]
-        size = sqrt(dot(change, change))
-        share = min(1.0, hardest * dt / size) if size > 0.0 else 1.0
-        for k in (0, 1, 2):
-            s[3 + k] += share * change[k]
-            s[k] += s[3 + k] * dt
-
-    def _probe(
-        self, s: list[float], i: WristInput, target: list[float], velocity: list[float]
-    ) -> tuple[list[float], list[float]]:
-        """Adds the probing move to the pivot's target."""
-        p = self.p
-        dt = p.period
-        if s[DONE] == 1.0 or not i.valid:
-            return target, velocity
-        known = i.stiffness_sigma < 0.15 and i.sigma_along < 1.5e-3
-        if s[PROBE] == PROBE_OFF:
-            s[PROBE] = PROBE_ON if i.stiffness_sigma > 0.3 else PROBE_BACK
-        s[PROBED] += dt
-        if known or s[PROBED] > p.probe_time:
-            s[PROBE] = PROBE_BACK
-        e = lateral_basis(i.u)[0]
-        speed = min(p.probe_speed, p.probe_force_rate / i.stiffness)
-        offset, way = s[OFFSET], s[WAY]
-        move = 0.0
-        if s[PROBE] == PROBE_BACK:
-            move = max(-speed * dt, min(speed * dt, -offset))
-            if offset + move == 0.0:
-                s[DONE] = 1.0
-        elif -dot(i.f, e) * way >= p.probe_force or offset * way >= p.probe_travel:
-            s[DWELL] += dt
-            if s[DWELL] > 0.1:
-                s[WAY], s[DWELL] = -way, 0.0
-        else:
-            move = way * speed * dt
-        s[OFFSET] = offset + move
-        for k in (0, 1, 2):
-            target[k] += s[OFFSET] * e[k]
-            velocity[k] += move / dt * e[k]
-        return target, velocity
-
-    def _watch(self, s: list[float], force: float, valid: bool) -> None:
-        """Freezes and releases the task."""
-        p = self.p
-        dt = p.period
-        s[OVER] = s[OVER] + dt if valid and force > p.force_limit else 0.0
-        s[SILENT] = 0.0 if valid else s[SILENT] + dt
-        calm = valid and force < p.release_force
-        s[CALM] = s[CALM] + dt if calm else 0.0
-        if s[FROZEN] != 0.0:
-            if s[CALM] >= p.release_time:
-                s[FROZEN] = 0.0
-        elif s[OVER] >= p.force_limit_time:
-            s[FROZEN] = 1.0
-            s[FREEZES] += 1.0
-        elif s[SILENT] > p.sensor_timeout:
-            s[FROZEN] = 2.0
-            s[FREEZES] += 1.0
-
-    def _scale(self, s: list[float], i: WristInput) -> float:
-        """Share of the task's speed that is safe now."""
-        p = self.p
-        if s[FROZEN] != 0.0:
-            return 0.0
-        if p.mode != "pwe":
-            return 1.0
-        if s[PROBE] != PROBE_OFF and s[DONE] == 0.0:
-            return 0.0
-        doubt = hypot(i.sigma_across / p.sure_across, i.sigma_along / p.sure_along)
-        return 1.0 if doubt <= 1.0 else max(p.slowest, 1.0 / doubt)
+@compiled
+def command(s: Floats, tool: Floats) -> Floats:
+    """Desired instrument: p_WP, u_W, v_WP, du_W, and the time they hold at (13)."""
+    v = tool[6:9].copy()
+    if s[FROZEN] != 0.0 or not np.isfinite(v).all():
+        v[:] = 0.0
+    away = s[6:9] - s[0:3]
+    reach = norm(xyz(away, 0))
+    u = away / reach
+    turn = v - s[3:6]
+    out = np.empty(13)
+    out[0:3], out[3:6], out[6:9], out[12] = s[6:9], u, v, s[TIME]
+    out[9:12] = (turn - dot(xyz(turn, 0), xyz(u, 0)) * u) / reach
+    return out

@@ -12,16 +12,17 @@ from math import exp, pi, sqrt
 import numpy as np
 
 from plants.abdomen.wall_motion import wave
-from systems.passive_wrist.fulcrum_filter import FulcrumParams, Sample
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
-from systems.passive_wrist.wall_model import dot
 from systems.passive_wrist.wrist_law import (
     DONE,
     FROZEN,
     PROBE,
-    WristInput,
-    WristLaw,
     WristParams,
+    command,
+    constants,
+    initial,
+    next_state,
 )
 
 LENGTH, INSIDE = 0.40, 0.18
@@ -116,8 +117,9 @@ def run(case: Case) -> dict[str, np.ndarray]:
     """Runs a case; the shaft starts unloaded at the true fulcrum."""
     rng = np.random.default_rng(case.seed)
     dt = case.fulcrum.period
-    estimator, law = FulcrumTracker(case.fulcrum), WristLaw(case.wrist)
-    z, state = estimator.initial(), law.initial()
+    estimator = FulcrumTracker(case.fulcrum)
+    law = constants(case.wrist)
+    z, state = estimator.initial(), initial(case.wrist)
     tip = case.tip or hold
     wall = case.wall
     p_tip, _ = tip(0.0)
@@ -152,50 +154,21 @@ def run(case: Case) -> dict[str, np.ndarray]:
         mm = m + mbias + rng.normal(0, case.moment_noise, 3)
         late.append((fm, mm))
         fm, mm = late[max(0, len(late) - 1 - case.delay)]
-        ul = u.tolist()
-        p_WSl = p_WS.tolist()
-        sample = Sample(
-            p_WSl,
-            ul,
-            dx[:3].tolist(),
-            du.tolist(),
-            fm.tolist(),
-            mm.tolist(),
-            case.fulcrum.damping,
-            turning=estimator.filter.turning(ul, dx[3:].tolist()),
-        )
-        z = estimator.step(z, sample)
-        if case.wrist.mode == "known":
-            ahead = (p_WI + case.wrist.horizon * v_WI).tolist(), v_WI.tolist()
-        else:
-            ahead = estimator.ahead(z, case.wrist.horizon)
-        C = estimator.covariance(z)
-        along = float(u @ C @ u)
-        across = (float(np.trace(C)) - along) / 2
+        shaft = np.concatenate([p_WS, u, dx[:3], du])
+        z = estimator.step(z, shaft, np.concatenate([fm, mm, [1.0]]), t)
+        truth = np.concatenate([p_WI, v_WI])
         p_WP, v_WP = tip(t)
-        stiffness, stiffness_sigma = estimator.stiffness(z)
-        state = law.step(
-            state,
-            WristInput(
-                p_WP,
-                v_WP,
-                p_WSl,
-                ul,
-                fm.tolist(),
-                True,
-                ahead[0],
-                ahead[1],
-                stiffness,
-                stiffness_sigma,
-                sqrt(across),
-                sqrt(along),
-            ),
-        )
-        pose = law.pose(state, v_WP)
+        wanted = np.array([*p_WP, 0.0, 0.0, -1.0, *v_WP, 0.0, 0.0, 0.0, t])
+        wrench = np.concatenate([fm, mm, [1.0]])
+        report = estimator.report(z, u, t)
+        state = next_state(law, state, wanted, shaft, wrench, report, truth, t)
+        C = estimator.covariance(z)
+        across, along, stiffness = report[6], report[7], report[8]
+        pose = command(state, wanted)
         p_d, u_d, v_d, du_d = (np.array(pose[k : k + 3]) for k in (0, 3, 6, 9))
         goal = np.concatenate([p_d - LENGTH * u_d, p_d])
         dgoal = np.concatenate([v_d - LENGTH * du_d, v_d])
-        error = np.array(estimator.ahead(z, 0.0)[0]) - p_WI
+        error = report[0:3] - p_WI
         rows.append(
             (
                 t,
@@ -203,8 +176,8 @@ def run(case: Case) -> dict[str, np.ndarray]:
                 float(np.linalg.norm(r)),
                 *error,
                 float(np.linalg.norm(error - u * (u @ error))),
-                sqrt(across),
-                sqrt(along),
+                across,
+                along,
                 stiffness,
                 float(error @ np.linalg.solve(C, error)),
                 estimator.breathing(z),
@@ -214,7 +187,7 @@ def run(case: Case) -> dict[str, np.ndarray]:
                 z[estimator.at("nis")],
                 z[estimator.at("phase")],
                 z[estimator.at("refused")],
-                dot(ul, error.tolist()),
+                float(u @ error),
             )
         )
         # Exact critically damped tracking of a target that moves linearly.

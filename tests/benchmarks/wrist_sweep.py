@@ -46,6 +46,7 @@ class Case:
     phase: float
     seed: int
     delay: int = 0
+    frequency: float = 120.0
 
 
 def sweep(seed: int) -> list[Case]:
@@ -79,6 +80,33 @@ def monte_carlo(seed: int, count: int) -> list[Case]:
     return cases
 
 
+def margins(seed: int) -> list[Case]:
+    """Control rates, and sensors that are late against the pose, in samples."""
+    return [
+        Case(k, 0.005, 0.2, 0.01, "ventilator", 0.2, seed, delay, frequency)
+        for k in (100.0, 500.0, 3000.0)
+        for frequency in (60.0, 120.0, 240.0)
+        for delay in ((0, 1, 2, 4) if frequency == 120.0 else (0,))
+    ]
+
+
+def margin_plot(rows: list[dict[str, object]], path: Path) -> None:
+    """Force against control rate and against delay, as a picture."""
+    figure = new_figure(8.0, 3.0)
+    left, right = add_axes(figure, 1, 2, 1), add_axes(figure, 1, 2, 2)
+    for stiffness in (100.0, 500.0, 3000.0):
+        here = [row for row in rows if row["stiffness"] == stiffness]
+        prompt = [row for row in here if row["delay"] == 0]
+        late = [row for row in here if row["frequency"] == 120.0]
+        force, label = "rms_lateral_force", f"{stiffness:.0f} N/m"
+        left.plot(column(prompt, "frequency"), column(prompt, force), "o-", label=label)
+        right.plot(column(late, "delay") / 0.12, column(late, force), "o-", label=label)
+    left.set(xlabel="control rate [Hz]", ylabel="rms force [N]", ylim=(0, None))
+    right.set(xlabel="force late by [ms], at 120 Hz", ylim=(0, None))
+    right.legend(frameon=False)
+    save_figure(figure, path)
+
+
 def scenario(case: Case, duration: float = DURATION) -> WristScenario:
     """The wrist study of a case: amplitude 1.5 times as large along the shaft."""
     a, e = case.amplitude, case.first_error
@@ -100,6 +128,13 @@ def scenario(case: Case, duration: float = DURATION) -> WristScenario:
     result.robot.p_WP = [0.0, 0.0, -0.15]
     result.abdomen.stiffness = case.stiffness
     result.tool_wrench.delay = case.delay
+    for part in (
+        result.joints,
+        result.tool_wrench,
+        result.fulcrum_estimator,
+        result.passive_wrist,
+    ):
+        part.period = 1.0 / case.frequency
     return result
 
 
@@ -162,13 +197,13 @@ def heat_map(rows: list[dict[str, object]], path: Path) -> None:
     save_figure(figure, path)
 
 
-def report(rows: list[dict[str, object]], title: str) -> None:
-    """Prints what the cases came to."""
+def summary(rows: list[dict[str, object]], title: str) -> str:
+    """What the cases came to."""
     rms, peak = column(rows, "rms_lateral_force"), column(rows, "max_lateral_force")
     above = column(rows, "nees_above_95")
     broken = [row for row in rows if row["error"]]
-    print(f"{title}: {len(rows)} cases, {len(broken)} ended early")
-    print(
+    lines = [f"{title}: {len(rows)} cases, {len(broken)} ended early"]
+    lines.append(
         f"  rms force  median {np.median(rms):.3f} N, worst {rms.max():.3f} N\n"
         f"  peak after 3 s  worst {peak.max():.2f} N, over 5 N {np.sum(peak > 5.0)}\n"
         f"  shaft off the fulcrum  median "
@@ -180,11 +215,12 @@ def report(rows: list[dict[str, object]], title: str) -> None:
     for wave in WAVES:
         some = [row for row in rows if row["wave"] == wave]
         if some:
-            print(
+            lines.append(
                 f"  {wave}: worst rms {column(some, 'rms_lateral_force').max():.3f} N, "
                 f"peak {column(some, 'max_lateral_force').max():.2f} N, above "
                 f"{np.nanmean(column(some, 'nees_above_95')):.3f}"
             )
+    return "\n".join(lines)
 
 
 def save(rows: list[dict[str, object]], path: Path) -> None:
@@ -195,26 +231,42 @@ def save(rows: list[dict[str, object]], path: Path) -> None:
         writer.writerows(rows)
 
 
+def study(seed: int, out: Path, jobs: int = 1, every: int = 1, random: int = 24) -> str:
+    """Runs sweep, margins and random walls; writes CSV files and plots into `out`."""
+    out.mkdir(parents=True, exist_ok=True)
+    texts = []
+    for name, cases, draw in (
+        ("sweep", sweep(seed)[::every], heat_map),
+        ("margins", margins(seed)[::every], margin_plot),
+        ("random walls", monte_carlo(seed, random), None),
+    ):
+        if not cases:
+            continue
+        rows = run_all(cases, jobs)
+        stem = f"wrist_{name.replace(' ', '_')}"
+        save(rows, out / f"{stem}.csv")
+        if draw is not None:
+            draw(rows, out / f"{stem}.png")
+        texts.append(summary(rows, name))
+    return "\n".join(texts)
+
+
+def report(seed: int, scenes: int) -> str:
+    """The study as `make bench` prints it."""
+    out = Path("out/wrist_sweep")
+    return f"{study(seed, out)}\n  cases and plots: {out}/"
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Runs the sweep and the Monte Carlo."""
+    """Runs the study."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--every", type=int, default=1, help="run every n-th case")
     parser.add_argument("--monte-carlo", type=int, default=24, help="random cases")
     parser.add_argument("--out", type=Path, default=Path("out/wrist_sweep"))
-    arguments = parser.parse_args(argv)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    rows = run_all(sweep(arguments.seed)[:: arguments.every], arguments.jobs)
-    save(rows, arguments.out / "wrist_sweep.csv")
-    heat_map(rows, arguments.out / "wrist_sweep.png")
-    report(rows, "sweep")
-    if arguments.monte_carlo:
-        random = run_all(
-            monte_carlo(arguments.seed, arguments.monte_carlo), arguments.jobs
-        )
-        save(random, arguments.out / "wrist_monte_carlo.csv")
-        report(random, "random walls")
+    a = parser.parse_args(argv)
+    print(study(a.seed, a.out, a.jobs, a.every, a.monte_carlo))
     return 0
 
 

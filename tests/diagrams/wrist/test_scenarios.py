@@ -127,3 +127,9 @@ def test_settled_and_last_above():
     assert settled(t, np.zeros(5), 1.0) == 0.0
     assert settled(t, np.array([0.0, 0.0, 0.0, 0.0, 9.0]), 1.0) is None
     assert last_above(t, np.array([0.0, 9.0, 3.0, 1.0, 0.0]), 2.0) == 3.0
+
+
+def test_a_late_sensor_costs_little_when_force_and_pose_belong_together():
+    figures = run("pwe_breathing", "tool_wrench.delay=2", "compare=[]").metrics
+    assert figures["rms_lateral_force"] < 0.15
+    assert figures["max_lateral_force"] < 1.0
