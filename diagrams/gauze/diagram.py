@@ -90,6 +90,7 @@ EMULATED = (
     ("passive_wrist.pivot", "robot_location.fulcrum"),
     ("tool_navigation.tool", "passive_wrist.tool_wanted"),
     ("passive_wrist.permission", "tool_navigation.permission"),
+    ("passive_wrist.permission", "clearance_constraint.permission"),
 )
 """Figure 2's passive wrist emulation between the local planner and the arm."""
 

@@ -71,6 +71,7 @@ _OUTWARDS = 0.05
 _MISSED = 1e-3
 """A row is missed by more than the solver's own error, m/s."""
 _ROWS = 14
+_FREE = np.array([1.0, 0.0])
 TOOLS = 3
 """Most obstacle tools: O, S, endoscope."""
 
@@ -314,6 +315,7 @@ def _step(
     target: np.ndarray,
     camera: np.ndarray,
     view_cone: np.ndarray,
+    permission: np.ndarray,
 ) -> np.ndarray:
     """The next state (3), the guide point's velocity (3) and the status (6)."""
     params = record[0]
@@ -325,7 +327,8 @@ def _step(
         return np.array(none + v + (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     g, p, s = xyz(robot_tool, 0), xyz(robot_tool, 3), guide[7]
     tools = obstacle_tools(margins[0], g, obstacle, target, camera)
-    wanted = (v[0] / s, v[1] / s, v[2] / s)
+    share = max(0.0, min(1.0, permission[0])) / s
+    wanted = (v[0] * share, v[1] * share, v[2] * share)
     v, dodges, status = constrain(
         params, workspace[0], view_cone, g, p, wanted, tools, state
     )
@@ -352,6 +355,8 @@ class ClearanceConstraint(Block):
     Port ``target`` accepts the estimate (17) of the target tool S.
     Port ``camera`` accepts the estimate (17) of the endoscope.
     Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
+    Port ``permission`` accepts the share of its speed that the passive wrist allows the
+    task, and a code that is not used (2); 1 if not connected. Evasion is not slowed.
     Port ``v_safe`` emits the velocity of the guide point (3), m/s, in W.
     Port ``status`` emits (6): the least rho - D_safe in m, 1 while a tool is near, 1
     while the evasion condition holds for all that are near, 1 while R dodges, by how
@@ -392,8 +397,10 @@ class ClearanceConstraint(Block):
             self.vector_in("camera", CAMERA_EXAMPLE),
             self.vector_in("view_cone", VIEW_CONE_EXAMPLE),
         ]
+        self._permission = self.vector_in("permission", _FREE.tolist())
         self.DeclareDiscreteState(np.zeros(TOOLS))
-        inputs = {port.ticket() for port in self._inputs} | {self.xd_ticket()}
+        inputs = {port.ticket() for port in (*self._inputs, self._permission)}
+        inputs |= {self.xd_ticket()}
         self._step = self.cached("step", self._calc_step, inputs)
         step_ticket = {self._step.ticket()}
         self.vector_out("v_safe", 3, lambda c: self._step.Eval(c)[3:6], step_ticket)
@@ -401,8 +408,10 @@ class ClearanceConstraint(Block):
         self.update_every(params.period, lambda c: self._step.Eval(c)[:3])
 
     def _calc_step(self, context: Any) -> np.ndarray:
+        told = self._permission.HasValue(context)
         return _step(
             *self._constants,
             context.get_discrete_state_vector().value(),
             *(port.Eval(context) for port in self._inputs),
+            self._permission.Eval(context) if told else _FREE,
         )
