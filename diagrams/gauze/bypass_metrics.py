@@ -55,7 +55,7 @@ def bypass_figures(
         "waiting_time": 0.0,
         "time_ratio": None,
     }
-    if run.scenario.behaviour == "bypass":
+    if "planner.way.waiting" in run.signals:
         way = run.matrix("planner.way")
         figures["edge_switches"] = round(way[-1, 5])
         figures["waiting_time"] = float(np.mean(way[:, 1] > 0.0) * time[-1])

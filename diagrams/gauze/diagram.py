@@ -8,7 +8,7 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
-from diagrams.common.wiring import connect, export, has_input, swap
+from diagrams.common.wiring import connect, export, has_input, has_output, swap
 from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
@@ -222,8 +222,8 @@ def make_gauze_diagram(
         connect(builder, systems, WIRES)
         export(builder, systems, EXPORTS)
     connect(builder, systems, [w for w in EXTRA_WIRES if has_input(systems, w[1])])
-    if scenario.behaviour == "bypass":
-        export(builder, systems, EXTRA_EXPORTS)
+    extra = {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    export(builder, systems, extra)
     diagram = builder.Build()
     diagram.set_name("gauze_delivery")
     return diagram

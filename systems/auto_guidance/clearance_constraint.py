@@ -409,9 +409,7 @@ class ClearanceConstraint(Block):
 
     def _calc_step(self, context: Any) -> np.ndarray:
         told = self._permission.HasValue(context)
-        return _step(
-            *self._constants,
-            context.get_discrete_state_vector().value(),
-            *(port.Eval(context) for port in self._inputs),
-            self._permission.Eval(context) if told else _FREE,
-        )
+        inputs = [port.Eval(context) for port in self._inputs]
+        inputs.append(self._permission.Eval(context) if told else _FREE)
+        state = context.get_discrete_state_vector().value()
+        return _step(*self._constants, state, *inputs)

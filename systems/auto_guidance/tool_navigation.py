@@ -300,7 +300,7 @@ class ToolNavigation(Block):
     Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
 
     Port ``permission`` accepts the share of its speed that the passive wrist allows,
-    0 for none, and why it must wait, a key of `REASONS` or 0 (2); free if not connected.
+    0 for none, and why it must wait, a key of `REASONS` or 0 (2); free without a wire.
     The share itself is kept before the evasion of tools, by the clearance constraint.
 
     Port ``tool`` emits the commanded p_WP [m], shaft direction u_W, v_WP [m/s],
