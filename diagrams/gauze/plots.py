@@ -7,6 +7,7 @@ import numpy as np
 
 from diagrams.common import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.gauze.bypass_plots import clearance
 from systems.common.geometry import closest_points
 
 MM = 1e3
@@ -173,6 +174,7 @@ def plots(run: Any) -> dict[str, Figure]:
         "speeds": speeds(run),
         "forces": forces(run),
         "virtual_force": virtual_force(run),
+        "clearance": clearance(run),
     }
     if run.scenario.emulated:
         start = run.scenario.measure_from

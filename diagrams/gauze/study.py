@@ -39,6 +39,9 @@ SIGNALS: dict[str, tuple[str, ...]] = {
     "planner.v3": XYZ,
     "planner.weights": ("c1", "c2", "c3"),
     "planner.v_R": XYZ,
+    "planner.v_safe": XYZ,
+    "planner.clearance": ("room", "near", "condition", "dodge", "change", "missed"),
+    "planner.way": ("way", "waiting", "aim_x", "aim_y", "aim_z", "switches"),
     "navigation.tool": (
         *SHAFT,
         *(f"v_{axis}" for axis in XYZ),
@@ -82,7 +85,7 @@ STUDY = Study(
     check=check,
     measure=measure,
     signals=SIGNALS,
-    optional=frozenset(WRIST_SIGNALS),
+    optional=frozenset({*WRIST_SIGNALS, "planner.way"}),
     log_period=1.0 / 30.0,
     plots=plots,
     decorate=decorate,

@@ -260,8 +260,7 @@ def _update(
     v = xyz(old, 6)
     p = along(xyz(old, 0), time - old[12], v)
     stop = why_stop(params, v_R, guide, robot, obstacle, target, view_cone, p)
-    pace = permission[0]
-    if stop == MOVING and not pace > 0.0:
+    if stop == MOVING and not permission[0] > 0.0:
         stop = int(permission[1])
     p_WG = xyz(robot, 0)
     if not all_finite(p_WG):
@@ -270,8 +269,7 @@ def _update(
     if stop == MOVING:
         s = max(guide[7], params.min_proportion)
         wanted = (v_R[0] / s, v_R[1] / s, v_R[2] / s)
-        x, y, z = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
-        wanted = (pace * x, pace * y, pace * z)
+        wanted = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
     change = limited(sub(wanted, v), params.acceleration * params.period)
     v = along(v, 1.0, change)
     shaft = sub(p, p_WG)
@@ -301,8 +299,9 @@ class ToolNavigation(Block):
 
     Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
 
-    Port ``permission`` accepts the share of its speed that the passive wrist allows
-    and why it must wait, a key of `REASONS` or 0 (2); free if not connected.
+    Port ``permission`` accepts the share of its speed that the passive wrist allows,
+    0 for none, and why it must wait, a key of `REASONS` or 0 (2); free without a wire.
+    The share itself is kept before the evasion of tools, by the clearance constraint.
 
     Port ``tool`` emits the commanded p_WP [m], shaft direction u_W, v_WP [m/s],
     du_W/dt [1/s] and the time [s] they hold at (13).

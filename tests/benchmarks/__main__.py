@@ -6,6 +6,7 @@ import importlib
 BENCHMARKS = {
     "speed": "tests.benchmarks.gauze_speed",
     "scenes": "tests.benchmarks.kinematic_scenes",
+    "bypass": "tests.benchmarks.bypass_suite",
     "snake": "tests.benchmarks.snake_speed",
     "switching": "tests.benchmarks.switching_suite",
     "wrist_step": "tests.benchmarks.wrist_step",
