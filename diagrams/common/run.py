@@ -133,7 +133,8 @@ def simulate_diagram(
     study = get_study(scenario.system)
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
-    sink = add_log(builder, station, study)
+    ports = logged_ports(station, study)
+    sink = add_log(builder, station, ports, study.log_period)
     recorder = replay.add_recorder(builder, station, meshcat, study)
     root = builder.Build()
     simulator = Simulator(root)
@@ -154,7 +155,7 @@ def simulate_diagram(
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    run.signals = read_log(sink, study, context)
+    run.signals = read_log(sink, study, ports, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
     if len(run.signals["time"]) > 1:
@@ -173,10 +174,12 @@ def advance(
     duration, period = run.scenario.duration, 1.0 / run.study.frame_rate
     simulator.Initialize()
     recorder.draw(simulator.get_context())
+    station = run.diagram.GetSubsystemByName("station")
     time, frame = 0.0, 0
     while time < duration:
         frame += 1
         time = min(frame * period, duration)
+        run.study.adjust(run.scenario, station, simulator.get_mutable_context())
         start = perf_counter()
         simulator.AdvanceTo(time)
         run.wall_time += perf_counter() - start
@@ -184,26 +187,37 @@ def advance(
         progress(time)
 
 
-def add_log(builder: Any, station: Any, study: Study) -> Any:
-    """Logs the study's signals, one below the other, in one sink.
+def logged_ports(station: Any, study: Study) -> list[str]:
+    """The study's signals, without the optional ones that this diagram lacks."""
+    return [
+        name
+        for name in study.signals
+        if name not in study.optional or station.HasOutputPort(name)
+    ]
+
+
+def add_log(builder: Any, station: Any, names: list[str], period: float) -> Any:
+    """Logs signals of a diagram, one below the other, in one sink.
 
     One sink for all: each system of a diagram costs time at each of its steps.
     """
-    ports = [station.GetOutputPort(name) for name in study.signals]
+    ports = [station.GetOutputPort(name) for name in names]
     bundle = builder.AddNamedSystem(
         "signals", Multiplexer([port.size() for port in ports])
     )
     for index, port in enumerate(ports):
         builder.Connect(port, bundle.get_input_port(index))
-    sink = LogVectorOutput(bundle.get_output_port(), builder, study.log_period)
+    sink = LogVectorOutput(bundle.get_output_port(), builder, period)
     sink.set_name("log")
     return sink
 
 
-def read_log(sink: Any, study: Study, context: Any) -> dict[str, np.ndarray]:
+def read_log(
+    sink: Any, study: Study, ports: list[str], context: Any
+) -> dict[str, np.ndarray]:
     """All columns of the log; "time" is the first."""
     log = sink.FindLog(context)
-    names = [name for port in study.signals for name in columns(study, port)]
+    names = [name for port in ports for name in columns(study, port)]
     signals = {"time": log.sample_times().copy()}
     for name, row in zip(names, log.data(), strict=True):
         signals[name] = row.copy()

@@ -171,6 +171,14 @@ def _follow(
     return _camera(params, p, v_WC)
 
 
+@compiled
+def _estimate(cone: np.ndarray, v: np.ndarray, p_WG: Vector) -> np.ndarray:
+    """The endoscope as the estimates (17) of the surgeon's tools."""
+    none = (0.0, 0.0, 0.0)
+    known = (0.0, 0.0, 0.0, 1.0, 0.0)
+    return np.array(xyz(cone, 0) + xyz(v, 0) + none + p_WG + known)
+
+
 class Endoscope(Block):
     """Follows the surgeon's target tool S and gives the field of view (section 2.1).
 
@@ -182,6 +190,8 @@ class Endoscope(Block):
     known are used. Port ``view_cone`` emits (7): apex p_WC in m, the unit vector of
     its axis, in W, and half its opening angle in rad. Port ``shaft`` emits the
     endoscope's shaft (6): tip p_WC in m and unit vector u_W, from outside to the tip.
+    Port ``estimate`` emits what is known of it as of a surgeon's tool (17): p_WC in m,
+    v_WC in m/s, no acceleration, the fulcrum p_WG in m, no deviations, known, age 0.
 
     Args:
         params: The endoscope and its limits.
@@ -202,7 +212,17 @@ class Endoscope(Block):
         self._cone = self.state_out("view_cone", start[:7])
         self.state_out("shaft", start[:6])
         self._velocity = self.DeclareDiscreteState(start[7:])
+        x, y, z = params.p_WG
+        self._p_WG = (float(x), float(y), float(z))
+        self.vector_out("estimate", 17, self._calc_estimate, {self.xd_ticket()})
         self.update_every(params.period, self._update)
+
+    def _calc_estimate(self, context: Any) -> np.ndarray:
+        return _estimate(
+            context.get_discrete_state(self._cone).value(),
+            context.get_discrete_state(self._velocity).value(),
+            self._p_WG,
+        )
 
     def _update(self, context: Any) -> tuple[np.ndarray, ...]:
         state = _follow(

@@ -31,6 +31,18 @@ OBSTACLE_EXAMPLE = [
 ]
 """An estimate of the obstacle tool O, crossing at 30 mm/s."""
 
+CAMERA_EXAMPLE = [
+    *(-0.01, -0.05, -0.08),
+    *(0.0, 0.0, 0.0),
+    *(0.0, 0.0, 0.0),
+    *(0.02, -0.1, 0.0),
+    *(0.0, 0.0, 0.0, 1.0, 0.0),
+]
+"""What is known of the endoscope, at rest; same shape as an estimate."""
+
+VIEW_CONE_EXAMPLE = [0.02, -0.1, 0.0, -0.41, 0.55, -0.727, 0.6]
+"""A view cone: apex, axis, half angle."""
+
 GUIDE_EXAMPLE = [
     *(0.012, 0.0, -0.072),
     *(-0.01, 0.02, -0.08),

@@ -43,8 +43,15 @@ REASONS = {
     5: "target outside the view cone",
     6: "arm does not follow",
     7: "waiting for the tracker's first frame",
+    8: "force on the wall over its limit",
+    9: "wrist sensor lost",
+    10: "probing the wall",
 }
 """Why the robot stands: the code on port ``stop`` and its text."""
+
+
+_FREE = np.array([1.0, 0.0])
+"""What the passive wrist permits where there is none."""
 
 
 @dataclass
@@ -245,6 +252,7 @@ def _update(
     obstacle: np.ndarray,
     target: np.ndarray,
     view_cone: np.ndarray,
+    permission: np.ndarray,
 ) -> np.ndarray:
     """The next state: the command `tool` (13), and why it stands (1)."""
     params = record[0]
@@ -252,6 +260,8 @@ def _update(
     v = xyz(old, 6)
     p = along(xyz(old, 0), time - old[12], v)
     stop = why_stop(params, v_R, guide, robot, obstacle, target, view_cone, p)
+    if stop == MOVING and not permission[0] > 0.0:
+        stop = int(permission[1])
     p_WG = xyz(robot, 0)
     if not all_finite(p_WG):
         p_WG = sub(p, xyz(old, 3))
@@ -288,6 +298,10 @@ class ToolNavigation(Block):
     Port ``target`` accepts the estimate of the target tool S (17).
 
     Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
+
+    Port ``permission`` accepts the share of its speed that the passive wrist allows,
+    0 for none, and why it must wait, a key of `REASONS` or 0 (2); free without a wire.
+    The share itself is kept before the evasion of tools, by the clearance constraint.
 
     Port ``tool`` emits the commanded p_WP [m], shaft direction u_W, v_WP [m/s],
     du_W/dt [1/s] and the time [s] they hold at (13).
@@ -331,12 +345,14 @@ class ToolNavigation(Block):
         self._view_cone = self.vector_in(
             "view_cone", [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.6]
         )
+        self._permission = self.vector_in("permission", _FREE.tolist())
         u = unit(sub(tuple(p_WP), tuple(p_WG)), _DOWN)
         self._command = self.state_out("tool", [*p_WP, *u, *[0.0] * 7])
         self.state_out("stop", [MOVING])
         self.update_every(self._params.period, self._next)
 
     def _next(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
+        told = self._permission.HasValue(context)
         state = _update(
             self._constants,
             context.get_discrete_state(self._command).value(),
@@ -347,5 +363,6 @@ class ToolNavigation(Block):
             self._obstacle.Eval(context),
             self._target.Eval(context),
             self._view_cone.Eval(context),
+            self._permission.Eval(context) if told else _FREE,
         )
         return state[:13], state[13:]

@@ -46,6 +46,7 @@ class Planner(Protocol):
         robot_tool: Sequence[float],
         obstacle: Sequence[float],
         target: Sequence[float],
+        others: Sequence[np.ndarray] = (),
     ) -> Vector:
         """The velocity of the robot's tip for the next `dt` seconds, m/s.
 
@@ -54,6 +55,7 @@ class Planner(Protocol):
             robot_tool: G_R, P_R (6), m.
             obstacle: Estimate (17) of O.
             target: Estimate (17) of S.
+            others: Estimates (17) of further tools.
         """
 
 
@@ -96,11 +98,12 @@ class LocalPlanner:
         robot_tool: Sequence[float],
         obstacle: Sequence[float],
         target: Sequence[float],
+        others: Sequence[np.ndarray] = (),
     ) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
         robot_tool = np.asarray(robot_tool, float)
-        self._v1_tip, guide = go_to_target.go_to_target(
-            self._go, self._v1_tip, dt, robot_tool, obstacle, target
+        self._v1_tip, guide = self._go_to_target(
+            dt, robot_tool, obstacle, target, others
         )
         self.guide = np.array(guide)
         zero = (0.0, 0.0, 0.0)
@@ -127,6 +130,19 @@ class LocalPlanner:
         )
         self.v_R = along(zero, s, self._v_tip)
         return self._v_tip
+
+    def _go_to_target(
+        self,
+        dt: float,
+        robot_tool: np.ndarray,
+        obstacle: Sequence[float],
+        target: Sequence[float],
+        others: Sequence[np.ndarray],
+    ) -> tuple[Vector, tuple[float, ...]]:
+        """v_1 / s and the guide signal; another form of the behaviour goes here."""
+        return go_to_target.go_to_target(
+            self._go, self._v1_tip, dt, robot_tool, obstacle, target
+        )
 
 
 def estimate(
@@ -197,6 +213,7 @@ def run(
     robot: Robot | None = None,
     time_limit: float = 15.0,
     watch: Callable[[float, Vector], None] | None = None,
+    sense: Callable[[float, np.ndarray], np.ndarray] | None = None,
 ) -> Outcome:
     """Runs a scene to its end: contact, arrival with O at rest, or the limit.
 
@@ -208,22 +225,24 @@ def run(
         robot: The robot's limits.
         time_limit: In seconds.
         watch: Called at every planner step with the time and the tip.
+        sense: Makes of the time and O's exact estimate what the planner gets.
     """
     robot = robot or Robot()
     tip = scene.p_WPr
     clearance, fraction = float("inf"), 1.0
     arrival: float | None = None
     target = estimate(scene.p_WPs, scene.p_WPs)
+    others = [estimate(p, g) for p, g in scene.others]
     substeps = 4
     dt = PLANNER_PERIOD / substeps
     for k in range(round(time_limit / PLANNER_PERIOD)):
         time = k * PLANNER_PERIOD
         p, v, a = scene.obstacle_tip(time)
+        obstacle = estimate(p, scene.p_WGo, v, a)
+        if sense:
+            obstacle = sense(time, obstacle)
         v_tip = planner.step(
-            PLANNER_PERIOD,
-            [*scene.p_WGr, *tip],
-            estimate(p, scene.p_WGo, v, a),
-            target,
+            PLANNER_PERIOD, [*scene.p_WGr, *tip], obstacle, target, others
         )
         if watch:
             watch(time, tip)
@@ -233,6 +252,10 @@ def run(
             _, l_share, axes, _, _ = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
             if axes - CONTACT < clearance:
                 clearance, fraction = axes - CONTACT, l_share
+            for p, g in scene.others:
+                axes = closest_points(scene.p_WGr, tip, g, p)[2]
+                if axes - CONTACT < clearance:
+                    clearance, fraction = axes - CONTACT, 1.0
         if clearance <= 0.0:
             return Outcome(False, True, clearance, fraction, arrival)
         near = norm(sub(tip, scene.p_WPs)) < 1e-3

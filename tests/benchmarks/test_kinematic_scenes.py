@@ -60,7 +60,7 @@ def test_a_leg_has_a_trapezoid_of_speed():
 class Straight:
     """A planner that goes straight at 50 mm/s and stops."""
 
-    def step(self, dt, robot_tool, obstacle, target):
+    def step(self, dt, robot_tool, obstacle, target, others=()):
         """See `Planner`."""
         d = sub(target[0:3], robot_tool[3:6])
         scale = min(0.05, 10.0 * norm(d)) / max(norm(d), 1e-9)
