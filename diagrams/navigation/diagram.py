@@ -68,6 +68,10 @@ def make_planner(scenario: NavigationScenario) -> Any:
         body_radius=radius,
         speed=speed,
         vision=scenario.perception.vision,
+        # What stands must not seem to move by the noise of its measured velocity.
+        standing_speed=max(
+            scenario.switching.standing_speed, 3.0 * scenario.perception.velocity_noise
+        ),
     )
     return SwitchingPlanner(switching, CAPACITY)
 

@@ -139,8 +139,13 @@ def shorter_side(
     clearance: float,
     look_ahead: float,
     spare: float,
+    kept: float,
 ) -> float:
-    """The side on which the way round a group turns least from the goal."""
+    """The side on which the way round a group turns least from the goal.
+
+    Arguments as of `way_round`; the goal lies in unit direction g, and `kept` is
+    the advantage [rad] of the counter-clockwise side.
+    """
     turns = []
     for side in (1.0, -1.0):
         ex, ey, _, _ = way_round(
@@ -148,7 +153,7 @@ def shorter_side(
         )
         turn = atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI
         turns.append(turn if turn < 1.5 * pi else 0.0)
-    return 1.0 if turns[0] <= turns[1] else -1.0
+    return 1.0 if turns[0] - turns[1] <= kept else -1.0
 
 
 def near(ax: float, ay: float, bx: float, by: float, distance: float) -> bool:

@@ -202,6 +202,8 @@ def _meet_group(
     member = first_on_ray(px, py, gx, gy, standing, wide)
     if member is None:
         return None
+    # The side of a bypass that has begun is kept unless it is much longer.
+    kept = state.side * pi / 2.0 if state.mode == BYPASS else 0.0
     side = shorter_side(
         px,
         py,
@@ -212,6 +214,7 @@ def _meet_group(
         clearance,
         params.body_radius,
         params.closed_gap,
+        kept,
     )
     free = free_range(px, py, gx, gy, standing, wide, params.vision)
     return SwitchingState(GROUP, member[0], side, min(distance - free, state.best))

@@ -82,6 +82,12 @@ def test_noise_is_repeatable_and_survived():
         np.testing.assert_array_equal(column, again.signals[name])
 
 
+def test_the_gap_is_passed_with_noise():
+    noise = ("perception.position_noise=0.01", "perception.velocity_noise=0.05")
+    r = run("local_minimum", *noise)
+    assert r.metrics["reached"] and not r.metrics["collided"]
+
+
 def test_a_faster_obstacle_is_told_and_the_robot_does_its_best():
     scenario = load_scenario("nav_one_moving")
     scenario.obstacles[0].velocity = [0.0, -0.8]
