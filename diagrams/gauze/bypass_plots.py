@@ -84,9 +84,7 @@ def forms(runs: dict[str, Any]) -> Figure:
         xlim=(middle[0] - half, middle[0] + half),
         ylim=(middle[1] - half, middle[1] + half),
         zlim=(middle[2] - half, middle[2] + half),
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-        zlabel="z [mm]",
+        title="fulcrums, shafts and ways of the tip [mm]",
     )
     axes.set_box_aspect((1, 1, 1))
     axes.view_init(elev=24, azim=-62)

@@ -7,6 +7,7 @@ BENCHMARKS = {
     "speed": "tests.benchmarks.gauze_speed",
     "scenes": "tests.benchmarks.kinematic_scenes",
     "bypass": "tests.benchmarks.bypass_suite",
+    "bypass-loop": "tests.benchmarks.bypass_full_loop",
     "snake": "tests.benchmarks.snake_speed",
     "switching": "tests.benchmarks.switching_suite",
     "wrist_step": "tests.benchmarks.wrist_step",
