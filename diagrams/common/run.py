@@ -1,6 +1,7 @@
 """Running a scenario: build, advance, log; then measure, plot and replay."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 import gc
 import json
@@ -17,12 +18,13 @@ from pydrake.systems.analysis import (
     SimulatorConfig,
 )
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from diagrams.common import metrics, replay
 from diagrams.common.plots import save_figure
 from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
 from diagrams.common.study import Study, build, get_study
+from systems.common.compiled import announced
 from systems.common.stopwatch import STOPWATCH
 
 INTEGRATOR = SimulatorConfig(
@@ -76,6 +78,26 @@ def columns(study: Study, port: str) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
+def rehearse(
+    diagram: Any, context: Any, config: SimulatorConfig, duration: float
+) -> None:
+    """Runs the first instants on a copy of the context, and forgets them.
+
+    The blocks' kernels are compiled at their first call, or loaded from the disk: that
+    is no part of the time that a run takes. An error will come again in the run.
+
+    Args:
+        diagram: The root diagram.
+        context: At the start of the run.
+        config: The run's integrator.
+        duration: How far to go, in s.
+    """
+    simulator = Simulator(diagram, context.Clone())
+    ApplySimulatorConfig(config, simulator)
+    with announced(), suppress(Exception, SystemExit):
+        simulator.AdvanceTo(duration)
+
+
 def simulate(
     scenario: Any,
     meshcat: Any = None,
@@ -116,16 +138,19 @@ def simulate_diagram(
     study = get_study(scenario.system)
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
-    sinks = add_logs(builder, station, study)
+    ports = logged_ports(station, study)
+    sink = add_log(builder, station, ports, study.log_period)
     duration = study.length(scenario)
     speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
     simulator = Simulator(root)
-    ApplySimulatorConfig(study.integrator(scenario) or INTEGRATOR, simulator)
+    config = study.integrator(scenario) or INTEGRATOR
+    ApplySimulatorConfig(config, simulator)
     context = simulator.get_mutable_context()
     root.SetRandomContext(context, RandomGenerator(scenario.seed))
     run = Run(scenario, study, root, duration=duration, replay_speed=speed)
+    rehearse(root, context, config, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
@@ -137,7 +162,7 @@ def simulate_diagram(
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    run.signals = read_logs(sinks, study, context)
+    run.signals = read_log(sink, study, ports, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
     if len(run.signals["time"]) > 1:
@@ -165,13 +190,15 @@ def advance(
     progress: Callable[[float], None],
 ) -> None:
     """Steps the simulator from frame to frame; only the steps are timed."""
-    duration, rate = run.duration, run.study.frame_rate / run.replay_speed
+    duration, period = run.duration, run.replay_speed / run.study.frame_rate
     simulator.Initialize()
     recorder.draw(simulator.get_context())
+    station = run.diagram.GetSubsystemByName("station")
     time, frame = 0.0, 0
     while time < duration:
         frame += 1
-        time = min(frame / rate, duration)
+        time = min(frame * period, duration)
+        run.study.adjust(run.scenario, station, simulator.get_mutable_context())
         start = perf_counter()
         simulator.AdvanceTo(time)
         run.wall_time += perf_counter() - start
@@ -179,28 +206,41 @@ def advance(
         progress(time)
 
 
-def add_logs(builder: Any, station: Any, study: Study) -> dict[str, Any]:
-    """Logs the study's signals: port name to log sink."""
-    sinks = {}
-    for port in study.signals:
-        output = station.GetOutputPort(port)
-        sinks[port] = LogVectorOutput(output, builder, study.log_period)
-        sinks[port].set_name(f"log({port})")
-    return sinks
+def logged_ports(station: Any, study: Study) -> list[str]:
+    """The study's signals, without the optional ones that this diagram lacks."""
+    return [
+        name
+        for name in study.signals
+        if name not in study.optional or station.HasOutputPort(name)
+    ]
 
 
-def read_logs(
-    sinks: dict[str, Any], study: Study, context: Any
+def add_log(builder: Any, station: Any, names: list[str], period: float) -> Any:
+    """Logs signals of a diagram, one below the other, in one sink.
+
+    One sink for all: each system of a diagram costs time at each of its steps.
+    """
+    ports = [station.GetOutputPort(name) for name in names]
+    bundle = builder.AddNamedSystem(
+        "signals", Multiplexer([port.size() for port in ports])
+    )
+    for index, port in enumerate(ports):
+        builder.Connect(port, bundle.get_input_port(index))
+    sink = LogVectorOutput(bundle.get_output_port(), builder, period)
+    sink.set_name("log")
+    return sink
+
+
+def read_log(
+    sink: Any, study: Study, ports: list[str], context: Any
 ) -> dict[str, np.ndarray]:
-    """All columns of the log, of one length; "time" is the first."""
-    signals: dict[str, np.ndarray] = {}
-    for port, sink in sinks.items():
-        log = sink.FindLog(context)
-        signals.setdefault("time", log.sample_times().copy())
-        for name, row in zip(columns(study, port), log.data(), strict=True):
-            signals[name] = row.copy()
-    shortest = min(len(column) for column in signals.values())
-    return {name: column[:shortest] for name, column in signals.items()}
+    """All columns of the log; "time" is the first."""
+    log = sink.FindLog(context)
+    names = [name for port in ports for name in columns(study, port)]
+    signals = {"time": log.sample_times().copy()}
+    for name, row in zip(names, log.data(), strict=True):
+        signals[name] = row.copy()
+    return signals
 
 
 def prepare_folder(out: Path) -> None:

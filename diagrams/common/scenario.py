@@ -207,6 +207,10 @@ def load_scenario(
         tree["seed"] = seed
     if duration is not None:
         tree["duration"] = duration
+    for key, value in tree.items():
+        # YAML reads a plain `off` as false; where a text is wanted it is one.
+        if value is False and typing.get_type_hints(schema).get(key) is str:
+            tree[key] = "off"
     for key in study.required:
         require(tree, key, path)
     check_tree(schema, tree)

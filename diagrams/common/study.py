@@ -10,6 +10,8 @@ from diagrams.common.scenario import Scenario, ScenarioError, nearest
 
 STUDIES = {
     "gauze": "diagrams.gauze.study",
+    "navigation": "diagrams.navigation.study",
+    "wrist": "diagrams.wrist.study",
     "snake": "diagrams.resection.snake_study",
     "resection": "diagrams.resection.resection_study",
 }
@@ -38,6 +40,7 @@ class Study:
         measure: The figures of a finished run, flat and in SI units.
         signals: Exported ports to log: port name to column names. A
             one-element port's column is the port's name itself.
+        optional: Those of the signals that only some scenarios' diagrams export.
         log_period: Period of the log [s], on the control clock.
         plots: Makes the figures of a run, by file name without ending.
         decorate: Adds trails, arrows and the like to a recording.
@@ -47,6 +50,8 @@ class Study:
         integrator: Makes the SimulatorConfig of a scenario; None for that of all
             continuous plants (`diagrams.common.run.INTEGRATOR`).
         view: The replay's camera.
+        adjust: Called with scenario, diagram and root context before every frame,
+            for parameters of the plant that change with time.
         frame_rate: Frames of the replay per second of it [1/s].
         length: How long a scenario really runs [s], at most its duration.
         replay_length: A run longer than this [s] is shown faster.
@@ -62,6 +67,8 @@ class Study:
     plots: Callable[[Any], dict[str, Any]]
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
+    optional: frozenset[str] = frozenset()
+    adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)

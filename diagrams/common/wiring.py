@@ -39,6 +39,18 @@ def port_of(systems: Mapping[str, Any], signal: str, output: bool) -> Any:
     return find(port)
 
 
+def has_input(systems: Mapping[str, Any], signal: str) -> bool:
+    """Whether the input that `system.port` names is there."""
+    name, _, port = signal.partition(".")
+    return name in systems and systems[name].HasInputPort(port)
+
+
+def has_output(systems: Mapping[str, Any], signal: str) -> bool:
+    """Whether the output that `system.port` names is there."""
+    name, _, port = signal.partition(".")
+    return name in systems and systems[name].HasOutputPort(port)
+
+
 def connect(
     builder: Any, systems: Mapping[str, Any], wires: Iterable[tuple[str, str]]
 ) -> None:

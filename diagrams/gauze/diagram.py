@@ -8,17 +8,21 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
-from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wiring import connect, export, has_input, has_output, swap
+from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from systems.auto_guidance.backward_movement import BackwardMovement
+from systems.auto_guidance.clearance_constraint import ClearanceConstraint
 from systems.auto_guidance.endoscope import Endoscope
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
 from systems.auto_guidance.go_to_target import GoToTarget
+from systems.auto_guidance.hunting_tool import HuntingTool
 from systems.auto_guidance.joint_commands import JointCommands
 from systems.auto_guidance.optical_tracker import OpticalTracker
 from systems.auto_guidance.robot_location import RobotLocation
 from systems.auto_guidance.surgeon_tool import SurgeonTool
+from systems.auto_guidance.tool_bypass import ToolBypass
 from systems.auto_guidance.tool_navigation import ToolNavigation
 from systems.auto_guidance.trajectory_estimator import TrajectoryEstimator
 from systems.auto_guidance.velocity_corrections import VelocityCorrections
@@ -51,8 +55,16 @@ WIRES = (
     ("robot_location.robot_tool", "fuzzy_arbiter.robot_tool"),
     ("obstacle_estimator.estimate", "fuzzy_arbiter.obstacle"),
     ("target_estimator.estimate", "fuzzy_arbiter.target"),
+    # The hard clearance to O, to S's own shaft and to the endoscope.
+    ("fuzzy_arbiter.v_R", "clearance_constraint.v_R"),
+    ("go_to_target.guide", "clearance_constraint.guide"),
+    ("robot_location.robot_tool", "clearance_constraint.robot_tool"),
+    ("obstacle_estimator.estimate", "clearance_constraint.obstacle"),
+    ("target_estimator.estimate", "clearance_constraint.target"),
+    ("endoscope.estimate", "clearance_constraint.camera"),
+    ("endoscope.view_cone", "clearance_constraint.view_cone"),
     # The guide point's velocity becomes tool motion, then joint motion.
-    ("fuzzy_arbiter.v_R", "tool_navigation.v_R"),
+    ("clearance_constraint.v_safe", "tool_navigation.v_R"),
     ("go_to_target.guide", "tool_navigation.guide"),
     ("robot_location.robot_tool", "tool_navigation.robot_tool"),
     ("obstacle_estimator.estimate", "tool_navigation.obstacle"),
@@ -65,7 +77,29 @@ WIRES = (
     ("obstacle_tool.shaft", "posed_tools.O"),
     ("endoscope.shaft", "posed_tools.C"),
 )
-"""Every signal of the diagram but the plant's own."""
+"""Every signal of the diagram but the plant's own, the fulcrum known."""
+
+TOLD = (
+    ("fulcrum.y0", "robot_location.fulcrum"),
+    ("tool_navigation.tool", "joint_commands.tool"),
+)
+"""The wires that the passive wrist takes the place of."""
+
+EMULATED = (
+    *WRIST_WIRES,
+    ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("tool_navigation.tool", "passive_wrist.tool_wanted"),
+    ("passive_wrist.permission", "tool_navigation.permission"),
+    ("passive_wrist.permission", "clearance_constraint.permission"),
+)
+"""Figure 2's passive wrist emulation between the local planner and the arm."""
+
+EXTRA_WIRES = (
+    ("endoscope.estimate", "go_to_target.camera"),
+    ("endoscope.view_cone", "go_to_target.view_cone"),
+    ("robot_location.robot_tool", "obstacle_tool.robot_tool"),
+)
+"""Wires to inputs that only some forms of a block have: the bypass, a hunting tool."""
 
 EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
@@ -82,6 +116,8 @@ EXPORTS = {
     "planner.v3": "backward_movement.v3",
     "planner.weights": "fuzzy_arbiter.weights",
     "planner.v_R": "fuzzy_arbiter.v_R",
+    "planner.v_safe": "clearance_constraint.v_safe",
+    "planner.clearance": "clearance_constraint.status",
     "navigation.tool": "tool_navigation.tool",
     "navigation.stop": "tool_navigation.stop",
     "joints.posture": "joint_commands.posture",
@@ -92,6 +128,9 @@ EXPORTS = {
     "scene_graph.query": "scene_graph.query",
 }
 """What can be logged, and drawn."""
+
+EXTRA_EXPORTS = {"planner.way": "go_to_target.way"}
+"""Outputs that only the bypass has."""
 
 
 def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
@@ -115,9 +154,18 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         )
         for tool in (target, obstacle)
     ]
-    return {
+    limits = replace(
+        s.workspace,  # the planner knows the limits of the navigation behind it
+        min_insertion=s.navigation.min_insertion,
+        max_insertion=s.navigation.max_insertion,
+        max_tilt=s.navigation.max_tilt,
+        cone_margin=s.navigation.cone_margin,
+    )
+    blocks = {
         "target_tool": SurgeonTool(target),
-        "obstacle_tool": SurgeonTool(obstacle),
+        "obstacle_tool": HuntingTool(obstacle, s.hunt)
+        if s.hunt.speed
+        else SurgeonTool(obstacle),
         "optical_tracker": OpticalTracker(s.tracker),
         "tracker_noise": RandomSource(
             RandomDistribution.kGaussian, 12, s.tracker.period
@@ -125,15 +173,22 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "target_estimator": TrajectoryEstimator(estimators[0]),
         "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
-        "fulcrum": ConstantVectorSource(s.robot.p_WG),
         "robot_location": RobotLocation(s.instrument),
-        "go_to_target": GoToTarget(s.go_to_target),
+        "go_to_target": ToolBypass(s.tool_bypass, s.margins, limits)
+        if s.behaviour == "bypass"
+        else GoToTarget(s.go_to_target),
         "velocity_corrections": VelocityCorrections(s.velocity_corrections),
         "backward_movement": BackwardMovement(s.backward_movement),
         "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter),
+        "clearance_constraint": ClearanceConstraint(
+            s.clearance_constraint, s.margins, limits
+        ),
         "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
+    if not s.emulated:
+        blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
+    return blocks
 
 
 def make_gauze_diagram(
@@ -158,8 +213,17 @@ def make_gauze_diagram(
     for name, block in blocks.items():
         builder.AddNamedSystem(name, block)
     systems = theatre.systems | blocks
-    connect(builder, systems, WIRES)
-    export(builder, systems, EXPORTS)
+    if scenario.emulated:
+        systems |= add_wrist(builder, theatre, scenario)
+        connect(builder, systems, [w for w in WIRES if w not in TOLD])
+        connect(builder, systems, EMULATED)
+        export(builder, systems, EXPORTS | WRIST_EXPORTS)
+    else:
+        connect(builder, systems, WIRES)
+        export(builder, systems, EXPORTS)
+    connect(builder, systems, [w for w in EXTRA_WIRES if has_input(systems, w[1])])
+    extra = {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    export(builder, systems, extra)
     diagram = builder.Build()
     diagram.set_name("gauze_delivery")
     return diagram

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.common.wrist_metrics import wrist_figures
+from diagrams.gauze.bypass_metrics import bypass_figures
 from systems.auto_guidance.tool_navigation import REASONS, WAITING
 
 REACHED_DISTANCE = 0.002
@@ -61,7 +63,7 @@ def measure(run: Any) -> dict[str, Any]:
     arrival = time_to_target(time, tip_error)
     touched = bool(clearance[:, 0].min() <= 0.0)
     speed = np.linalg.norm(np.gradient(tip, time, axis=0), axis=1)
-    return {
+    figures = {
         "reached": arrival is not None and not touched,
         "contact": touched,
         "time_to_target": arrival,
@@ -77,3 +79,7 @@ def measure(run: Any) -> dict[str, Any]:
         "joint_limit_time": float(np.mean(run.signals["joints.status"]) * time[-1]),
         "stops": stops(time, run.signals["navigation.stop"]),
     }
+    figures |= bypass_figures(run, arrival, tip_error)
+    if run.scenario.emulated:
+        figures |= wrist_figures(run, run.scenario.measure_from)
+    return figures

@@ -5,7 +5,9 @@ from typing import Any
 from matplotlib.figure import Figure
 import numpy as np
 
+from diagrams.common import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.gauze.bypass_plots import clearance
 from systems.common.geometry import closest_points
 
 MM = 1e3
@@ -125,7 +127,8 @@ def virtual_force(run: Any) -> Figure:
     p_WS = run.matrix("target.shaft")[index, :3] * MM
     p_WGO = _fulcrum(run, "obstacle") * MM
     M_R, M_O = map(
-        np.array, closest_points(*(x.tolist() for x in (p_WG, p_WP, p_WGO, p_WO)))[3:]
+        np.array,
+        closest_points(*(tuple(x.tolist()) for x in (p_WG, p_WP, p_WGO, p_WO)))[3:],
     )
     s = np.linalg.norm(M_R - p_WG) / np.linalg.norm(p_WP - p_WG)
     M_Rf = p_WG + s * (p_WS - p_WG)
@@ -166,9 +169,15 @@ def virtual_force(run: Any) -> Figure:
 
 def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
-    return {
+    figures = {
         "trajectory": trajectory(run),
         "speeds": speeds(run),
         "forces": forces(run),
         "virtual_force": virtual_force(run),
+        "clearance": clearance(run),
     }
+    if run.scenario.emulated:
+        start = run.scenario.measure_from
+        figures["forces"] = wrist_plots.forces({run.scenario.wrist: run}, start)
+        figures["estimate"] = wrist_plots.estimate(run, start)
+    return figures

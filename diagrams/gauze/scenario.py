@@ -3,25 +3,34 @@
 from dataclasses import dataclass, field
 import math
 
-from diagrams.common.scenario import Scenario, ScenarioError
+import numpy as np
+
+from diagrams.common.scenario import Scenario, ScenarioError, nearest
+from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
 from systems.auto_guidance.backward_movement import BackwardMovementParams
+from systems.auto_guidance.clearance_constraint import ClearanceConstraintParams
 from systems.auto_guidance.endoscope import EndoscopeParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams
+from systems.auto_guidance.hunting_tool import Hunt
 from systems.auto_guidance.joint_commands import JointCommandsParams
+from systems.auto_guidance.obstacle_tools import Margins
 from systems.auto_guidance.optical_tracker import OpticalTrackerParams
 from systems.auto_guidance.recording import load_recording
 from systems.auto_guidance.surgeon_tool import SurgeonToolParams
+from systems.auto_guidance.tool_bypass import ToolBypassParams
 from systems.auto_guidance.tool_navigation import (
     ToolNavigationParams,
     cone_angle,
+    constants,
     reachable,
 )
 from systems.auto_guidance.trajectory_estimator import TrajectoryEstimatorParams
 from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
+from systems.auto_guidance.workspace import WorkspaceParams
 
 
 @dataclass
@@ -38,7 +47,7 @@ class RobotTool:
 
 
 @dataclass
-class GauzeScenario(Scenario):
+class GauzeScenario(Scenario, WristSettings):
     """Auto-guided movements (section 5 of the paper): gauze to the surgeon.
 
     Attributes:
@@ -46,17 +55,33 @@ class GauzeScenario(Scenario):
             place of O's waypoints.
         known_fulcrums: Whether the estimators are told G_S and G_O, for
             comparison; else they find them from the shafts' lines.
+        behaviour: Form of "go to target": "bypass" (attract or bypass), or "field"
+            (the paper's sum of potentials, see `go_to_target.form`).
+        time_ratio: Whether the run is repeated without O to give the figure
+            `time_ratio`.
+        hunt: O chases the robot's shaft, if its speed is not 0.
+        measure_from: Force figures of the wrist start here [s].
     """
 
     recording: str = field(default="", metadata={"file": True})
     known_fulcrums: bool = False
+    behaviour: str = "bypass"
+    measure_from: float = 0.0
     robot: RobotTool = field(default_factory=RobotTool)
     target: SurgeonToolParams = field(default_factory=SurgeonToolParams)
     obstacle: SurgeonToolParams = field(default_factory=SurgeonToolParams)
+    time_ratio: bool = False
+    hunt: Hunt = field(default_factory=Hunt)
     camera: EndoscopeParams = field(default_factory=EndoscopeParams)
     tracker: OpticalTrackerParams = field(default_factory=OpticalTrackerParams)
     estimator: TrajectoryEstimatorParams = field(
         default_factory=TrajectoryEstimatorParams
+    )
+    margins: Margins = field(default_factory=Margins)
+    workspace: WorkspaceParams = field(default_factory=WorkspaceParams)
+    tool_bypass: ToolBypassParams = field(default_factory=ToolBypassParams)
+    clearance_constraint: ClearanceConstraintParams = field(
+        default_factory=ClearanceConstraintParams
     )
     go_to_target: GoToTargetParams = field(default_factory=GoToTargetParams)
     velocity_corrections: VelocityCorrectionsParams = field(
@@ -72,6 +97,13 @@ class GauzeScenario(Scenario):
     instrument: InstrumentParams = field(default_factory=InstrumentParams)
     abdomen: AbdomenParams = field(default_factory=AbdomenParams)
 
+    @property
+    def emulated(self) -> bool:
+        """Whether the passive wrist is in the diagram: its fulcrum is not given."""
+        return self.wrist != "known" or not self.wall_motion.still
+
+
+BEHAVIOURS = ("bypass", "field")
 
 LEAST_FULCRUM_DISTANCE = 0.02
 """Two trocars cannot be closer [m]."""
@@ -82,6 +114,14 @@ def check(scenario: GauzeScenario) -> None:
     for part in vars(scenario).values():
         if hasattr(part, "check"):
             part.check()
+    if scenario.behaviour not in BEHAVIOURS:
+        hint = nearest(scenario.behaviour, BEHAVIOURS)
+        raise ScenarioError(f"behaviour={scenario.behaviour!r}: {hint}")
+    if scenario.hunt.speed and scenario.recording:
+        raise ScenarioError(
+            f"hunt.speed={scenario.hunt.speed}: expected 0 together with a recording"
+        )
+    check_wrist(scenario)
     if scenario.recording:
         load_recording(scenario.recording)
     points = {
@@ -118,12 +158,13 @@ def _check_fulcrums(scenario: GauzeScenario) -> None:
 def _check_reach(scenario: GauzeScenario) -> None:
     """The start and S's first tip must be reachable and in view."""
     limits = scenario.navigation
+    record = constants(limits)[0]
     p_WG = scenario.robot.p_WG
     for name, point in (
         ("robot.p_WP", scenario.robot.p_WP),
         ("target.points[0]", scenario.target.points[0]),
     ):
-        if not reachable(limits, p_WG, point):
+        if not reachable(record, tuple(p_WG), tuple(point)):
             raise ScenarioError(
                 f"{name}={point} is out of reach through robot.p_WG="
                 f"{scenario.robot.p_WG}: expected an insertion in "
@@ -134,8 +175,9 @@ def _check_reach(scenario: GauzeScenario) -> None:
     start = scenario.target.points[0]
     axis = [p - a for p, a in zip(scenario.camera.p_WS, apex, strict=True)]
     length = math.hypot(*axis)
-    cone = [*apex, *(x / length for x in axis), scenario.camera.half_angle]
-    if cone_angle(cone, start) > scenario.camera.half_angle:
+    half_angle = scenario.camera.half_angle
+    cone = np.array([*apex, *(x / length for x in axis), half_angle])
+    if cone_angle(cone, tuple(start)) > scenario.camera.half_angle:
         raise ScenarioError(
             f"target.points[0]={start} lies outside the view cone of half angle "
             f"{scenario.camera.half_angle} rad about camera.p_WS={scenario.camera.p_WS}"

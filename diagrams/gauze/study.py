@@ -4,8 +4,11 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.common.bedside import stiffen
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
+from diagrams.common.wrist import WRIST_SIGNALS
+from diagrams.common.wrist_replay import decorate_wrist
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.plots import plots
@@ -17,7 +20,7 @@ ESTIMATE = (
     *(f"{part}_{axis}" for part in ("p", "v", "a", "fulcrum") for axis in XYZ),
     *("sigma_p", "sigma_v", "sigma_a", "known", "age"),
 )
-SIGNALS = {
+SIGNALS: dict[str, tuple[str, ...]] = {
     "robot.tool": (*(f"fulcrum_{axis}" for axis in XYZ), "tip_x", "tip_y", "tip_z"),
     "target.shaft": SHAFT,
     "obstacle.shaft": SHAFT,
@@ -36,6 +39,9 @@ SIGNALS = {
     "planner.v3": XYZ,
     "planner.weights": ("c1", "c2", "c3"),
     "planner.v_R": XYZ,
+    "planner.v_safe": XYZ,
+    "planner.clearance": ("room", "near", "condition", "dodge", "change", "missed"),
+    "planner.way": ("way", "waiting", "aim_x", "aim_y", "aim_z", "switches"),
     "navigation.tool": (
         *SHAFT,
         *(f"v_{axis}" for axis in XYZ),
@@ -48,6 +54,7 @@ SIGNALS = {
     "clearance": ("obstacle", "target", "camera"),
     "wall.force": XYZ,
     "wall.fulcrum_error": ("distance",),
+    **WRIST_SIGNALS,
 }
 METRES_PER_NEWTON = 0.02
 """Scale of the replay's force arrow."""
@@ -61,6 +68,9 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
         ("obstacle", run.matrix("obstacle.shaft")[:, :3], (0.85, 0.2, 0.15, 1.0)),
     ):
         draw_trail(meshcat, animation, f"trails/{name}", time, signal, rgba)
+    if run.scenario.emulated:
+        decorate_wrist(meshcat, animation, run)
+        return
     force = run.matrix("wall.force") * METRES_PER_NEWTON
     origins = np.broadcast_to(run.scenario.robot.p_WG, force.shape)
     draw_arrow(
@@ -75,10 +85,12 @@ STUDY = Study(
     check=check,
     measure=measure,
     signals=SIGNALS,
+    optional=frozenset({*WRIST_SIGNALS, "planner.way"}),
     log_period=1.0 / 30.0,
     plots=plots,
     decorate=decorate,
     controller="tool_navigation",
+    adjust=stiffen,
     required=(
         "system",
         "duration",

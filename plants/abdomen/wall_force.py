@@ -3,6 +3,7 @@
 For metrics, plots and tests; no controller may look at it.
 """
 
+from collections.abc import Callable
 import math
 from typing import Any
 
@@ -54,10 +55,20 @@ class WallForce(LeafSystem):
     are left out (20 g, and D times millimetres per second).
     Port ``fulcrum_error`` emits the distance of the shaft's line from the true
     fulcrum in m (1).
+    Port ``fulcrum`` emits the true fulcrum p_WI in m and its velocity in m/s (6).
     """
 
-    def __init__(self, abdomen: Abdomen) -> None:
+    def __init__(
+        self, abdomen: Abdomen, factor: Callable[[float], float] = lambda time: 1.0
+    ) -> None:
+        """Makes the block.
+
+        Args:
+            abdomen: What `add_abdomen` returned.
+            factor: The trocar's stiffness against the abdomen's, by time in s.
+        """
         super().__init__()
+        self._factor = factor
         self._wall = int(abdomen.wall.index())
         self._sleeve = int(abdomen.sleeve.index())
         self._stiffness = abdomen.params.stiffness
@@ -80,10 +91,16 @@ class WallForce(LeafSystem):
             "force",
             3,
             self._calc_force,
-            {self._poses.ticket(), self._velocities.ticket()},
+            {self._poses.ticket(), self._velocities.ticket(), self.time_ticket()},
         )
         self.DeclareVectorOutputPort(
             "fulcrum_error", 1, self._calc_error, {self._poses.ticket()}
+        )
+        self.DeclareVectorOutputPort(
+            "fulcrum",
+            6,
+            self._calc_fulcrum,
+            {self._poses.ticket(), self._velocities.ticket()},
         )
 
     def _calc_lever(self, context: Any) -> tuple[Vector, Vector]:
@@ -100,7 +117,8 @@ class WallForce(LeafSystem):
             - velocities[self._sleeve].translational()
         )
         p, u = self._lever.Eval(context)
-        force, _ = lateral_force(p, u, v.tolist(), self._stiffness, self._damping)
+        stiffness = self._stiffness * self._factor(context.get_time())
+        force, _ = lateral_force(p, u, v.tolist(), stiffness, self._damping)
         output.SetFromVector(force)
 
     def _calc_error(self, context: Any, output: Any) -> None:
@@ -108,10 +126,20 @@ class WallForce(LeafSystem):
         _, error = lateral_force(p, u, (0.0, 0.0, 0.0), 0.0, 0.0)
         output.SetFromVector([error])
 
+    def _calc_fulcrum(self, context: Any, output: Any) -> None:
+        p_WI = self._poses.Eval(context)[self._wall].translation()
+        v_WI = self._velocities.Eval(context)[self._wall].translational()
+        output.SetFromVector([*p_WI, *v_WI])
 
-def add_wall_force(builder: Any, plant: Any, abdomen: Abdomen) -> WallForce:
+
+def add_wall_force(
+    builder: Any,
+    plant: Any,
+    abdomen: Abdomen,
+    factor: Callable[[float], float] = lambda time: 1.0,
+) -> WallForce:
     """Adds the block as `wall_force` and wires it to the plant."""
-    block = builder.AddNamedSystem("wall_force", WallForce(abdomen))
+    block = builder.AddNamedSystem("wall_force", WallForce(abdomen, factor))
     for name in ("body_poses", "body_spatial_velocities"):
         builder.Connect(plant.GetOutputPort(name), block.GetInputPort(name))
     return block

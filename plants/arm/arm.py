@@ -110,6 +110,10 @@ class SetPoint:
     accuracy of 1e-3, steps from one control instant to the next, and its implicit
     step arrives where the set-point says. (An integrator with many steps to a hold
     arrives in its middle, and then runs up to half a period ahead.)
+
+    Attributes:
+        lead: Of the sent position per desired velocity in s (7).
+        compliance: Of the sent position per torque in rad/Nm (7).
     """
 
     def __init__(self, params: ArmParams | None = None, period: float = 0.0) -> None:
@@ -127,8 +131,8 @@ class SetPoint:
         if not period >= 0.0:
             raise ValueError(f"SetPoint: period={period} s must be >= 0")
         kp = np.array(params.kp)
-        self._lead = (np.array(params.kd) + FRICTION) / kp + period
-        self._compliance = 1.0 / kp
+        self.lead = (np.array(params.kd) + FRICTION) / kp + period
+        self.compliance = 1.0 / kp
 
     def __call__(
         self,
@@ -145,7 +149,7 @@ class SetPoint:
                 instrument's weight; None for none.
         """
         sent = np.zeros(2 * JOINTS)
-        sent[:JOINTS] = q_d + self._lead * v_d
+        sent[:JOINTS] = q_d + self.lead * v_d
         if tau is not None:
-            sent[:JOINTS] += self._compliance * tau
+            sent[:JOINTS] += self.compliance * tau
         return sent

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import (
     Capsule,
@@ -116,6 +117,7 @@ class PosedTools(LeafSystem):
         self._ports: list[Any] = []
         self._frames: list[Any] = []
         self._trocars: list[Any] = []
+        self._fulcrums = np.array(self.params.fulcrums, float)
         for name, fulcrum in zip(NAMES, self.params.fulcrums, strict=True):
             self._frames.append(self._add_tool(scene_graph, name))
             self._trocars.append(self._add_trocar(scene_graph, name))
@@ -132,14 +134,14 @@ class PosedTools(LeafSystem):
     def _calc_poses(self, context: Any, output: Any) -> None:
         poses = FramePoseVector()
         for port, frame, trocar, fulcrum in zip(
-            self._ports, self._frames, self._trocars, self.params.fulcrums, strict=True
+            self._ports, self._frames, self._trocars, self._fulcrums, strict=True
         ):
-            px, py, pz, ux, uy, uz = port.Eval(context).tolist()
-            R = RotationMatrix.MakeFromOneVector([ux, uy, uz], 2)
-            poses.set_value(frame, RigidTransform(R, [px, py, pz]))
-            gx, gy, gz = fulcrum
-            along = (gx - px) * ux + (gy - py) * uy + (gz - pz) * uz
-            nearest = [px + along * ux, py + along * uy, pz + along * uz]
+            # Arrays: Drake takes over a list several times slower.
+            shaft = port.Eval(context)
+            p, u = shaft[:3], shaft[3:]
+            R = RotationMatrix.MakeFromOneVector(u, 2)
+            poses.set_value(frame, RigidTransform(R, p))
+            nearest = p + u.dot(fulcrum - p) * u
             poses.set_value(trocar, RigidTransform(R, nearest))
         output.set_value(poses)
 

@@ -13,7 +13,8 @@ for z and any point of a cylinder is reached.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.inverse_kinematics import half_bend, vectors
+from plants.snake.inverse_kernels import half_bend
+from plants.snake.inverse_kinematics import vectors
 from plants.snake.kinematics import Array
 from plants.snake.parameters import SnakeParams
 

@@ -10,9 +10,8 @@ constant 1/B and dies out when O stops, as the text says.
 O stops.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, isfinite
+from math import exp
 from typing import Any
 
 import numpy as np
@@ -25,12 +24,15 @@ from systems.auto_guidance.signals import (
     velocity,
 )
 from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
+    all_finite,
     along,
     shaft_point_velocity,
     sub,
     unit,
+    xyz,
 )
 
 FORMS = ("corrected", "printed")
@@ -64,28 +66,26 @@ class BackwardMovementParams:
                 raise ValueError(f"{name}={value} must be finite and > 0")
 
 
-def contact_velocity(guide: Sequence[float], obstacle: Sequence[float]) -> Vector:
+@compiled
+def contact_velocity(guide: Numbers, obstacle: Numbers) -> Vector:
     """v_O, the velocity of O's material point M_O, m/s.
 
     Args:
         guide: The guide signal (12).
         obstacle: A usable estimate (17) of O.
     """
-    o = unit(sub(obstacle[0:3], fulcrum(obstacle)))
+    o = unit(sub(xyz(obstacle, 0), fulcrum(obstacle)))
     return shaft_point_velocity(guide[8], o, velocity(obstacle))
 
 
+@compiled
 def backward_movement(
-    params: BackwardMovementParams,
-    v3: Sequence[float],
-    dt: float,
-    guide: Sequence[float],
-    obstacle: Sequence[float],
+    params: Any, v3: Numbers, dt: float, guide: Numbers, obstacle: Numbers
 ) -> Vector:
     """One step of the behaviour.
 
     Args:
-        params: Parameters.
+        params: A record of `constants`.
         v3: v_3 before the step, m/s.
         dt: Length of the step, s.
         guide: The guide signal (12).
@@ -94,13 +94,32 @@ def backward_movement(
     Returns:
         v_3 after the step, m/s.
     """
-    v_o: Vector = (0.0, 0.0, 0.0)
-    if usable(obstacle) and isfinite(sum(guide)):
+    v_o = (0.0, 0.0, 0.0)
+    if usable(obstacle) and all_finite(guide):
         v_o = contact_velocity(guide, obstacle)
-    if params.form == "printed":
+    if params.printed:
         return along(v3, params.gain * dt, v_o)
     # The exact solution for a v_O that is constant over the step.
     return along(v3, 1.0 - exp(-params.gain * dt), sub(v_o, v3))
+
+
+def constants(params: BackwardMovementParams) -> np.ndarray:
+    """The parameters as the compiled functions take them."""
+    return packed(params, printed=params.form == "printed")
+
+
+@compiled
+def _step(
+    record: np.ndarray,
+    state: np.ndarray,
+    time: float,
+    guide: np.ndarray,
+    obstacle: np.ndarray,
+) -> np.ndarray:
+    """The next state: v_3 and the time."""
+    dt = time - state[3]
+    v3 = backward_movement(record[0], xyz(state, 0), dt, guide, obstacle)
+    return np.array((v3[0], v3[1], v3[2], time))
 
 
 class BackwardMovement(Block):
@@ -128,31 +147,27 @@ class BackwardMovement(Block):
         super().__init__()
         self._params = params or BackwardMovementParams()
         self._params.check()
+        self._constants = constants(self._params)
         self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
         self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
         self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        self._v3 = self.vector_out(
-            "v3",
-            3,
-            self._calc_v3,
-            {
-                self._guide.ticket(),
-                self._obstacle.ticket(),
-                self.xd_ticket(),
-                self.time_ticket(),
-            },
-        )
-        self.update_every(self._params.period, self._update)
+        inputs = {
+            self._guide.ticket(),
+            self._obstacle.ticket(),
+            self.xd_ticket(),
+            self.time_ticket(),
+        }
+        # The output and the update share one step.
+        self._step = self.cached("step", self._calc_step, inputs)
+        step_ticket = {self._step.ticket()}
+        self.vector_out("v3", 3, lambda c: self._step.Eval(c)[:3], step_ticket)
+        self.update_every(self._params.period, self._step.Eval)
 
-    def _calc_v3(self, context: Any) -> Vector:
-        *v3, t_last = context.get_discrete_state_vector().value().tolist()
-        return backward_movement(
-            self._params,
-            v3,
-            context.get_time() - t_last,
-            self._guide.Eval(context).tolist(),
-            self._obstacle.Eval(context).tolist(),
+    def _calc_step(self, context: Any) -> np.ndarray:
+        return _step(
+            self._constants,
+            context.get_discrete_state_vector().value(),
+            context.get_time(),
+            self._guide.Eval(context),
+            self._obstacle.Eval(context),
         )
-
-    def _update(self, context: Any) -> list[float]:
-        return [*self._v3.Eval(context).tolist(), context.get_time()]

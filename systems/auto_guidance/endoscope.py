@@ -5,7 +5,6 @@ view "by following the surgeon's tool S with the camera and forcing the robot to
 to be within the view field".
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 from typing import Any
@@ -13,6 +12,17 @@ from typing import Any
 import numpy as np
 
 from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled, packed
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    limited,
+    norm,
+    sub,
+    unit,
+    xyz,
+)
 
 
 @dataclass
@@ -85,57 +95,88 @@ class EndoscopeParams:
             )
 
 
-def wanted_tip(
-    params: EndoscopeParams, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """Where the camera's tip should be to look at a point: p_WC in m.
+def constants(params: EndoscopeParams) -> np.ndarray:
+    """The parameters as the compiled functions take them.
+
+    Raises:
+        ValueError: If `params` make no sense.
+    """
+    params.check()
+    return packed(params)
+
+
+@compiled
+def wanted_tip(params: Any, p: Numbers) -> Vector:
+    """Where the camera's tip should be to look at a point p in W: p_WC in m.
 
     Args:
-        params: The endoscope.
-        x: The point in W, in m.
-        y: The same.
-        z: The same.
+        params: A record of `constants`.
+        p: The point in W, in m.
     """
-    gx, gy, gz = params.p_WG
-    dx, dy, dz = x - gx, y - gy, z - gz
-    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    g = xyz(params.p_WG, 0)
+    d = sub(p, g)
+    distance = norm(d)
     insertion = distance - params.standoff
     insertion = max(params.min_insertion, min(params.max_insertion, insertion))
-    k = insertion / max(distance, 1e-6)
-    return gx + k * dx, gy + k * dy, gz + k * dz
+    return along(g, insertion / max(distance, 1e-6), d)
 
 
+@compiled
 def follow(
-    params: EndoscopeParams, state: Sequence[float], target: Sequence[float] | None
-) -> tuple[float, ...]:
+    params: Any, p: Numbers, v: Numbers, target: Numbers, is_known: bool
+) -> tuple[Vector, Vector]:
     """One period of the camera's motion.
 
     Args:
-        params: The endoscope.
-        state: p_WC in m and v_WC in m/s (6).
-        target: The point to look at in m (3), or None to come to rest.
+        params: A record of `constants`.
+        p: The camera's tip p_WC in m.
+        v: Its velocity v_WC in m/s.
+        target: The point to look at in m.
+        is_known: Whether there is one; else the camera comes to rest.
 
     Returns:
-        The next state (6).
+        p_WC in m and v_WC in m/s a period later.
     """
-    px, py, pz, vx, vy, vz = state
-    dt = params.period
-    wx = wy = wz = 0.0
-    if target is not None:
-        qx, qy, qz = wanted_tip(params, *target)
+    wanted = (0.0, 0.0, 0.0)
+    if is_known:
+        d = sub(wanted_tip(params, target), p)
         rate = params.rate
-        wx, wy, wz = rate * (qx - px), rate * (qy - py), rate * (qz - pz)
-        speed = math.sqrt(wx * wx + wy * wy + wz * wz)
-        if speed > params.max_speed:
-            k = params.max_speed / speed
-            wx, wy, wz = k * wx, k * wy, k * wz
-    ax, ay, az = wx - vx, wy - vy, wz - vz
-    change = math.sqrt(ax * ax + ay * ay + az * az)
-    most = params.max_acceleration * dt
-    if change > most:
-        k = most / change
-        wx, wy, wz = vx + k * ax, vy + k * ay, vz + k * az
-    return px + dt * wx, py + dt * wy, pz + dt * wz, wx, wy, wz
+        wanted = limited((rate * d[0], rate * d[1], rate * d[2]), params.max_speed)
+    change = limited(sub(wanted, v), params.max_acceleration * params.period)
+    v = along(v, 1.0, change)
+    return along(p, params.period, v), v
+
+
+@compiled
+def _camera(params: Any, p: Vector, v: Vector) -> np.ndarray:
+    """The state: shaft p_WC, u_W and half angle (7), and v_WC (3)."""
+    u = unit(sub(p, xyz(params.p_WG, 0)))
+    return np.array(p + u + (params.half_angle,) + v)
+
+
+@compiled
+def _start(record: np.ndarray) -> np.ndarray:
+    params = record[0]
+    return _camera(params, wanted_tip(params, xyz(params.p_WS, 0)), (0.0, 0.0, 0.0))
+
+
+@compiled
+def _follow(
+    record: np.ndarray, cone: np.ndarray, v: np.ndarray, estimate: np.ndarray
+) -> np.ndarray:
+    params = record[0]
+    target = xyz(estimate, 0)
+    is_known = estimate[15] > 0.5 and all_finite(target)
+    p, v_WC = follow(params, xyz(cone, 0), xyz(v, 0), target, is_known)
+    return _camera(params, p, v_WC)
+
+
+@compiled
+def _estimate(cone: np.ndarray, v: np.ndarray, p_WG: Vector) -> np.ndarray:
+    """The endoscope as the estimates (17) of the surgeon's tools."""
+    none = (0.0, 0.0, 0.0)
+    known = (0.0, 0.0, 0.0, 1.0, 0.0)
+    return np.array(xyz(cone, 0) + xyz(v, 0) + none + p_WG + known)
 
 
 class Endoscope(Block):
@@ -149,6 +190,8 @@ class Endoscope(Block):
     known are used. Port ``view_cone`` emits (7): apex p_WC in m, the unit vector of
     its axis, in W, and half its opening angle in rad. Port ``shaft`` emits the
     endoscope's shaft (6): tip p_WC in m and unit vector u_W, from outside to the tip.
+    Port ``estimate`` emits what is known of it as of a surgeon's tool (17): p_WC in m,
+    v_WC in m/s, no acceleration, the fulcrum p_WG in m, no deviations, known, age 0.
 
     Args:
         params: The endoscope and its limits.
@@ -160,32 +203,32 @@ class Endoscope(Block):
     def __init__(self, params: EndoscopeParams | None = None) -> None:
         super().__init__()
         params = params or EndoscopeParams()
-        params.check()
-        self._params = params
+        self._constants = constants(params)
         self._target = self.vector_in(
             "target",
             [0.0, 0.0, -0.13, *[0.0] * 6, 0.05, 0.0, 0.0, 1e-3, 1e-2, 0.1, 1.0, 0.02],
         )
-        start = [*wanted_tip(params, *params.p_WS), 0.0, 0.0, 0.0]
-        self.DeclareDiscreteState(np.array(start))
-        state = {self.xd_ticket()}
-        self.vector_out("view_cone", 7, self._calc_cone, state)
-        self.vector_out("shaft", 6, self._calc_shaft, state)
-        self.update_every(params.period, self._follow)
+        start = _start(self._constants)
+        self._cone = self.state_out("view_cone", start[:7])
+        self.state_out("shaft", start[:6])
+        self._velocity = self.DeclareDiscreteState(start[7:])
+        x, y, z = params.p_WG
+        self._p_WG = (float(x), float(y), float(z))
+        self.vector_out("estimate", 17, self._calc_estimate, {self.xd_ticket()})
+        self.update_every(params.period, self._update)
 
-    def _follow(self, context: Any) -> Sequence[float]:
-        estimate = self._target.Eval(context).tolist()
-        x, y, z = estimate[:3]
-        usable = estimate[15] > 0.5 and math.isfinite(x + y + z)
-        state = context.get_discrete_state(0).value().tolist()
-        return follow(self._params, state, (x, y, z) if usable else None)
+    def _calc_estimate(self, context: Any) -> np.ndarray:
+        return _estimate(
+            context.get_discrete_state(self._cone).value(),
+            context.get_discrete_state(self._velocity).value(),
+            self._p_WG,
+        )
 
-    def _calc_shaft(self, context: Any) -> Sequence[float]:
-        x, y, z, _, _, _ = context.get_discrete_state(0).value().tolist()
-        gx, gy, gz = self._params.p_WG
-        ux, uy, uz = x - gx, y - gy, z - gz
-        length = math.sqrt(ux * ux + uy * uy + uz * uz)
-        return x, y, z, ux / length, uy / length, uz / length
-
-    def _calc_cone(self, context: Any) -> Sequence[float]:
-        return (*self._calc_shaft(context), self._params.half_angle)
+    def _update(self, context: Any) -> tuple[np.ndarray, ...]:
+        state = _follow(
+            self._constants,
+            context.get_discrete_state(self._cone).value(),
+            context.get_discrete_state(self._velocity).value(),
+            self._target.Eval(context),
+        )
+        return state[:7], state[:6], state[7:]

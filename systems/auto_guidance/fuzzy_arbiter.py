@@ -25,7 +25,7 @@ An obstacle at rest has no direction, and is left to the field.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import hypot
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,8 @@ from systems.auto_guidance.signals import (
     usable,
 )
 from systems.common.block import Block
-from systems.common.fuzzy import Partition, RuleTable
+from systems.common.compiled import Numbers, compiled, packed
+from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
     Vector,
     all_finite,
@@ -49,6 +50,8 @@ from systems.common.geometry import (
     limited,
     norm,
     sub,
+    unit,
+    xyz,
 )
 
 TABLE_I = [
@@ -137,28 +140,28 @@ class FuzzyArbiterParams:
             )
 
 
-def quadrants(x: float, y: float, moving_speed: float) -> list[float]:
+@compiled
+def quadrants(x: float, y: float, moving_speed: float) -> np.ndarray:
     """Membership of a velocity in the quadrants 1 to 4.
 
     cos^2 of the angle to a quadrant's diagonal, within 90 degrees. Below
     `moving_speed` the direction counts less and less: every quadrant gains.
     """
-    speed = hypot(x, y)
+    speed = sqrt(x * x + y * y)
     if speed < 1e-9:
-        return [1.0, 1.0, 1.0, 1.0]
+        return np.ones(4)
     # Components along the diagonals of quadrants 1 and 2.
     c1 = (x + y) / speed
     c2 = (y - x) / speed
     unsure = max(0.0, 1.0 - speed / moving_speed)
-    return [
-        max(0.5 * c1 * c1 if c1 > 0.0 else 0.0, unsure),
-        max(0.5 * c2 * c2 if c2 > 0.0 else 0.0, unsure),
-        max(0.5 * c1 * c1 if c1 < 0.0 else 0.0, unsure),
-        max(0.5 * c2 * c2 if c2 < 0.0 else 0.0, unsure),
-    ]
+    degree = 0.5 * np.array((c1 * c1, c2 * c2, c1 * c1, c2 * c2))
+    degree[2 if c1 > 0.0 else 0] = 0.0
+    degree[3 if c2 > 0.0 else 1] = 0.0
+    return np.maximum(degree, unsure)
 
 
-def axes(guide: Sequence[float]) -> tuple[Vector, Vector]:
+@compiled
+def axes(guide: Numbers) -> tuple[Vector, Vector]:
     """The quadrants' axes x, y (unit vectors); see the module.
 
     Where the tools' axes touch or the goal lies along y, a fixed perpendicular
@@ -167,74 +170,89 @@ def axes(guide: Sequence[float]) -> tuple[Vector, Vector]:
     Args:
         guide: The guide signal (12).
     """
-    rx, ry, rz, ox, oy, oz, *_, fx, fy, fz = guide
-    goal = (fx - rx, fy - ry, fz - rz)
-    y = (ox - rx, oy - ry, oz - rz)
-    size = norm(y)
-    if size < 1e-12:
-        y = any_perpendicular(goal)
-    else:
-        y = (y[0] / size, y[1] / size, y[2] / size)
-    x = along(goal, -dot(goal, y), y)
-    size = norm(x)
+    m_r = xyz(guide, 0)
+    goal = sub(xyz(guide, 9), m_r)
+    y = unit(sub(xyz(guide, 3), m_r), any_perpendicular(goal))
+    across = along(goal, -dot(goal, y), y)
+    size = norm(across)
     if size < 1e-6:
         return any_perpendicular(y), y
-    return (x[0] / size, x[1] / size, x[2] / size), y
+    return (across[0] / size, across[1] / size, across[2] / size), y
 
 
-class Decision:
-    """Table I and the weights' table with their memberships."""
-
-    def __init__(self, params: FuzzyArbiterParams) -> None:
-        self._params = params
-        # Table I concludes with a label, not with a number.
-        self._table = RuleTable(TABLE_I, {label: [] for label in DECISIONS})
-        self._weights = RuleTable(WEIGHT_TABLE, WEIGHTS)
-        self._distances = Partition(DISTANCES, params.distances)
-
-    def labels(self, v_r: tuple[float, float], v_o: tuple[float, float]) -> list[float]:
-        """Degrees of DECISIONS for two velocities on the axes x, y, m/s."""
-        slow = self._params.moving_speed
-        return self._table.activations(quadrants(*v_o, slow), quadrants(*v_r, slow))
-
-    def weights(self, labels: Sequence[float], distance: float) -> list[float]:
-        """(c_1, c_2, c_3) for degrees of DECISIONS at a distance in m."""
-        return self._weights.infer(labels, self._distances.degrees(distance))
-
-    def __call__(
-        self, v1: Sequence[float], guide: Sequence[float], obstacle: Sequence[float]
-    ) -> list[float]:
-        """(c_1, c_2, c_3) for finite inputs and a known obstacle."""
-        params = self._params
-        v_o = contact_velocity(guide, obstacle)
-        # The tremor and the estimate's noise of a tool at rest do not count.
-        alert = min(1.0, 2.0 * norm(v_o) / params.moving_speed - 1.0)
-        if alert <= 0.0:
-            return [1.0, 0.0, 0.0]
-        x, y = axes(guide)
-        r_y, o_y = dot(v1, y), dot(v_o, y)
-        if params.table == "gated":
-            alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
-        if alert <= 0.0:
-            return [1.0, 0.0, 0.0]
-        s = guide[7]
-        labels = self.labels((dot(v1, x) / s, r_y / s), (dot(v_o, x), o_y))
-        c1, c2, c3 = self.weights(labels, guide[6] - params.contact_distance)
-        return [1.0 + alert * (c1 - 1.0), alert * c2, alert * c3]
+def constants(params: FuzzyArbiterParams) -> np.ndarray:
+    """The parameters and both tables as the compiled functions take them."""
+    # Table I concludes with a label, not with a number.
+    table_i = RuleTable(TABLE_I, {label: [] for label in DECISIONS})
+    weights = RuleTable(WEIGHT_TABLE, WEIGHTS)
+    return packed(
+        params,
+        gated=params.table == "gated",
+        table_i=table_i.cells,
+        weight_table=weights.cells,
+        weights=weights.values,
+    )
 
 
+@compiled
+def decision_labels(
+    params: Any, v_r: tuple[float, float], v_o: tuple[float, float]
+) -> np.ndarray:
+    """Table I: degrees of DECISIONS for two velocities on the axes x, y, m/s."""
+    slow = params.moving_speed
+    rows, columns = quadrants(v_o[0], v_o[1], slow), quadrants(v_r[0], v_r[1], slow)
+    return activations(params.table_i, 4, rows, columns)
+
+
+@compiled
+def label_weights(params: Any, labels: np.ndarray, distance: float) -> Vector:
+    """(c_1, c_2, c_3) for degrees of DECISIONS at a distance in m."""
+    near = degrees(params.distances, distance)
+    weight = activations(params.weight_table, len(params.weights), labels, near)
+    return xyz(weighted_mean(weight, params.weights), 0)
+
+
+@compiled
+def decision(params: Any, v1: Numbers, guide: Numbers, obstacle: Numbers) -> Vector:
+    """(c_1, c_2, c_3) for finite inputs and a known obstacle.
+
+    Args:
+        params: A record of `constants`.
+        v1: v_1, m/s.
+        guide: The guide signal (12).
+        obstacle: Estimate (17) of O.
+    """
+    v_o = contact_velocity(guide, obstacle)
+    # The tremor and the estimate's noise of a tool at rest do not count.
+    alert = min(1.0, 2.0 * norm(v_o) / params.moving_speed - 1.0)
+    if alert <= 0.0:
+        return 1.0, 0.0, 0.0
+    x, y = axes(guide)
+    r_y, o_y = dot(v1, y), dot(v_o, y)
+    if params.gated:
+        alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
+    if alert <= 0.0:
+        return 1.0, 0.0, 0.0
+    s = guide[7]
+    labels = decision_labels(params, (dot(v1, x) / s, r_y / s), (dot(v_o, x), o_y))
+    distance = guide[6] - params.contact_distance
+    c1, c2, c3 = label_weights(params, labels, distance)
+    return 1.0 + alert * (c1 - 1.0), alert * c2, alert * c3
+
+
+@compiled
 def commanded_velocity(
-    params: FuzzyArbiterParams,
-    v_tip: Sequence[float],
+    params: Any,
+    v_tip: Numbers,
     dt: float,
-    weights: Sequence[float],
-    velocities: Sequence[Sequence[float]],
+    weights: Numbers,
+    velocities: Sequence[Numbers],
     s: float,
 ) -> Vector:
     """v_R / s of equation (6), the tip's velocity, within its limits, m/s.
 
     Args:
-        params: Parameters.
+        params: A record of `constants`.
         v_tip: v_R / s before the step, m/s.
         dt: Length of the step, s.
         weights: (c_1, c_2, c_3).
@@ -249,6 +267,72 @@ def commanded_velocity(
     )
     change = sub(limited(wanted, params.max_speed), v_tip)
     return along(v_tip, 1.0, limited(change, params.max_acceleration * dt))
+
+
+@compiled
+def arbitrate(
+    params: Any,
+    v_tip: Numbers,
+    dt: float,
+    velocities: tuple[Numbers, Numbers, Numbers],
+    guide: Numbers,
+    robot_tool: Numbers,
+    obstacle: Numbers,
+    target: Numbers,
+) -> tuple[Vector, Vector, float]:
+    """One step of the block: decision, sum and limits.
+
+    Args:
+        params: A record of `constants`.
+        v_tip: v_R / s before the step, m/s.
+        dt: Length of the step, s.
+        velocities: v_1, v_2, v_3, m/s.
+        guide: The guide signal (12).
+        robot_tool: G_R, P_R (6), m.
+        obstacle: Estimate (17) of O.
+        target: Estimate (17) of S.
+
+    Returns:
+        (weights, v_R / s in m/s, s).
+    """
+    v1, v2, v3 = velocities
+    known = usable(obstacle) and usable(target)
+    moves = all_finite(v1) and all_finite(v2) and all_finite(v3)
+    if not (known and moves and all_finite(guide) and all_finite(robot_tool)):
+        s = guide[7] if all_finite(guide) else 1.0
+        change = limited(sub((0.0, 0.0, 0.0), v_tip), params.max_acceleration * dt)
+        return (0.0, 0.0, 0.0), along(v_tip, 1.0, change), s
+    weights = decision(params, v1, guide, obstacle)
+    s = guide[7]
+    return weights, commanded_velocity(params, v_tip, dt, weights, velocities, s), s
+
+
+@compiled
+def _step(
+    record: np.ndarray,
+    state: np.ndarray,
+    time: float,
+    v1: np.ndarray,
+    v2: np.ndarray,
+    v3: np.ndarray,
+    guide: np.ndarray,
+    robot_tool: np.ndarray,
+    obstacle: np.ndarray,
+    target: np.ndarray,
+) -> np.ndarray:
+    """The next state (4), the weights (3) and v_R (3)."""
+    weights, v_tip, s = arbitrate(
+        record[0],
+        xyz(state, 0),
+        time - state[3],
+        (xyz(v1, 0), xyz(v2, 0), xyz(v3, 0)),
+        guide,
+        robot_tool,
+        obstacle,
+        target,
+    )
+    v_r = along((0.0, 0.0, 0.0), s, v_tip)
+    return np.array(v_tip + (time,) + weights + v_r)
 
 
 class FuzzyArbiter(Block):
@@ -285,98 +369,32 @@ class FuzzyArbiter(Block):
         super().__init__()
         self._params = params or FuzzyArbiterParams()
         self._params.check()
-        self._decision = Decision(self._params)
-        self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
-        self._v2 = self.vector_in("v2", [-0.01, 0.0, 0.0])
-        self._v3 = self.vector_in("v3", [0.0, -0.01, 0.0])
-        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
-        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
-        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
-        self._target = self.vector_in("target", TARGET_EXAMPLE)
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        inputs = {
-            port.ticket()
-            for port in (
-                self._v1,
-                self._v2,
-                self._v3,
-                self._guide,
-                self._robot_tool,
-                self._obstacle,
-                self._target,
-            )
+        self._constants = constants(self._params)
+        examples = {
+            "v1": [0.05, 0.0, 0.0],
+            "v2": [-0.01, 0.0, 0.0],
+            "v3": [0.0, -0.01, 0.0],
+            "guide": GUIDE_EXAMPLE,
+            "robot_tool": ROBOT_TOOL_EXAMPLE,
+            "obstacle": OBSTACLE_EXAMPLE,
+            "target": TARGET_EXAMPLE,
         }
+        # In the order in which `_step` takes them.
+        self._inputs = [self.vector_in(*item) for item in examples.items()]
+        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
+        tickets = {port.ticket() for port in self._inputs}
         self._step = self.cached(
-            "step", self._calc_step, inputs | {self.xd_ticket(), self.time_ticket()}
+            "step", self._calc_step, tickets | {self.xd_ticket(), self.time_ticket()}
         )
         step_ticket = {self._step.ticket()}
-        self.vector_out("weights", 3, lambda c: self._step.Eval(c)[0], step_ticket)
-        self.vector_out("v_R", 3, self._calc_v_r, step_ticket)
-        self.update_every(self._params.period, self._update)
+        self.vector_out("weights", 3, lambda c: self._step.Eval(c)[4:7], step_ticket)
+        self.vector_out("v_R", 3, lambda c: self._step.Eval(c)[7:], step_ticket)
+        self.update_every(self._params.period, lambda c: self._step.Eval(c)[:4])
 
-    def _calc_step(self, context: Any) -> tuple[list[float], Vector, float]:
-        """(weights, v_R / s, s)."""
-        *v_tip, t_last = context.get_discrete_state_vector().value().tolist()
-        v1 = self._v1.Eval(context).tolist()
-        v2 = self._v2.Eval(context).tolist()
-        v3 = self._v3.Eval(context).tolist()
-        guide = self._guide.Eval(context).tolist()
-        robot_tool = self._robot_tool.Eval(context).tolist()
-        obstacle = self._obstacle.Eval(context).tolist()
-        target = self._target.Eval(context).tolist()
-        return arbitrate(
-            self._params,
-            self._decision,
-            v_tip,
-            context.get_time() - t_last,
-            (v1, v2, v3),
-            guide,
-            robot_tool,
-            obstacle,
-            target,
+    def _calc_step(self, context: Any) -> np.ndarray:
+        return _step(
+            self._constants,
+            context.get_discrete_state_vector().value(),
+            context.get_time(),
+            *[port.Eval(context) for port in self._inputs],
         )
-
-    def _calc_v_r(self, context: Any) -> Vector:
-        _, v_tip, s = self._step.Eval(context)
-        return s * v_tip[0], s * v_tip[1], s * v_tip[2]
-
-    def _update(self, context: Any) -> list[float]:
-        return [*self._step.Eval(context)[1], context.get_time()]
-
-
-def arbitrate(
-    params: FuzzyArbiterParams,
-    decision: Decision,
-    v_tip: Sequence[float],
-    dt: float,
-    velocities: tuple[Sequence[float], Sequence[float], Sequence[float]],
-    guide: Sequence[float],
-    robot_tool: Sequence[float],
-    obstacle: Sequence[float],
-    target: Sequence[float],
-) -> tuple[list[float], Vector, float]:
-    """One step of the block: decision, sum and limits.
-
-    Args:
-        params: Parameters.
-        decision: The tables.
-        v_tip: v_R / s before the step, m/s.
-        dt: Length of the step, s.
-        velocities: v_1, v_2, v_3, m/s.
-        guide: The guide signal (12).
-        robot_tool: G_R, P_R (6), m.
-        obstacle: Estimate (17) of O.
-        target: Estimate (17) of S.
-
-    Returns:
-        (weights, v_R / s in m/s, s).
-    """
-    known = usable(obstacle) and usable(target)
-    if not (known and all_finite(*velocities, guide, robot_tool)):
-        s = guide[7] if all_finite(guide) else 1.0
-        weights = [0.0, 0.0, 0.0]
-        change = limited(sub((0.0, 0.0, 0.0), v_tip), params.max_acceleration * dt)
-        return weights, along(v_tip, 1.0, change), s
-    weights = decision(velocities[0], guide, obstacle)
-    s = guide[7]
-    return weights, commanded_velocity(params, v_tip, dt, weights, velocities, s), s

@@ -28,9 +28,8 @@ which attraction alone asks for v_max; attraction is cut at the same distance.
 the robot away from its goal rather than from the obstacle, and orbits.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, hypot, isfinite
+from math import exp, sqrt
 from typing import Any
 
 import numpy as np
@@ -44,6 +43,7 @@ from systems.auto_guidance.signals import (
     velocity,
 )
 from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
     all_finite,
@@ -53,8 +53,10 @@ from systems.common.geometry import (
     cross,
     dot,
     limited,
+    norm,
     sub,
     unit,
+    xyz,
 )
 
 FORMS = ("corrected", "printed")
@@ -132,12 +134,13 @@ class GoToTargetParams:
         return self.max_speed * self.damping / (2.0 * self.attraction_gain)
 
 
+@compiled
 def guide_point(
-    robot_tool: Sequence[float],
-    obstacle: Sequence[float],
-    p_WPs: Sequence[float],
+    robot_tool: Numbers,
+    obstacle: Numbers,
+    p_WPs: Numbers,
     proportion_floor: float,
-) -> list[float]:
+) -> tuple[float, ...]:
     """Steps 1 and 2 of the procedure: the guide point and its target.
 
     Args:
@@ -150,43 +153,42 @@ def guide_point(
         The `guide` signal (12): M_R, M_O, rho, s, l/L, M_R^f. rho is the true
         distance of the axes, also where s is floored.
     """
-    g = robot_tool[0:3]
-    p = robot_tool[3:6]
-    s, fraction, rho, m_r, m_o = closest_points(g, p, fulcrum(obstacle), obstacle[0:3])
+    g = xyz(robot_tool, 0)
+    p = xyz(robot_tool, 3)
+    p_o = xyz(obstacle, 0)
+    s, fraction, rho, m_r, m_o = closest_points(g, p, fulcrum(obstacle), p_o)
     if s < proportion_floor:
         s = proportion_floor
         m_r = along(g, s, sub(p, g))
     m_rf = along(g, s, sub(p_WPs, g))
-    return [*m_r, *m_o, rho, s, fraction, *m_rf]
+    return m_r + m_o + (rho, s, fraction) + m_rf
 
 
-def potential_distance(rho: float, params: GoToTargetParams) -> float:
+@compiled
+def potential_distance(rho: float, params: Any) -> float:
     """The rho of the potential, m: floored just off contact, where it is singular."""
     return max(rho - params.contact_distance, 5e-4)
 
 
-def away_from_obstacle(guide: Sequence[float], u: Sequence[float]) -> Vector:
+@compiled
+def away_from_obstacle(guide: Numbers, u: Numbers) -> Vector:
     """Unit vector n_o from M_O to M_R; across R's shaft `u` where they touch."""
-    dx, dy, dz = guide[0] - guide[3], guide[1] - guide[4], guide[2] - guide[5]
-    rho = hypot(dx, dy, dz)
-    if rho < 1e-12:
-        return any_perpendicular(u)
-    return dx / rho, dy / rho, dz / rho
+    d = (guide[0] - guide[3], guide[1] - guide[4], guide[2] - guide[5])
+    return unit(d, any_perpendicular(u))
 
 
-def corrected_force(
-    params: GoToTargetParams, guide: Sequence[float], u: Sequence[float]
-) -> Vector:
+@compiled
+def corrected_force(params: Any, guide: Numbers, u: Numbers) -> Vector:
     """F_1 / s of equation (1), corrected form: acceleration of the tip, m/s^2.
 
     Args:
-        params: Gains and distances.
+        params: A record of `constants`.
         guide: The guide signal (12).
         u: Unit vector along R's shaft, fulcrum to tip.
     """
     s = guide[7]
     goal = (guide[9] - guide[0], guide[10] - guide[1], guide[11] - guide[2])
-    r = hypot(goal[0], goal[1], goal[2])
+    r = norm(goal)
     r_tip = r / s
     r_far = params.slowing_distance
     # F_att = 2 K_a r_goal, cut at r_far.
@@ -212,7 +214,8 @@ def corrected_force(
     # It fades near the goal and where goal and fixed side cancel: there its
     # direction would flip at every step.
     fade = r_tip / floor if r_tip < floor else 1.0
-    slide = 0.5 * k_r * gap * gap * fade / (s * hypot(nx, ny, nz, _TIE))
+    size = sqrt(nx * nx + ny * ny + nz * nz + _TIE * _TIE)
+    slide = 0.5 * k_r * gap * gap * fade / (s * size)
     return (
         pull * goal[0] + push * n_o[0] + slide * nx,
         pull * goal[1] + push * n_o[1] + slide * ny,
@@ -220,13 +223,12 @@ def corrected_force(
     )
 
 
-def printed_force(
-    params: GoToTargetParams, guide: Sequence[float], u: Sequence[float]
-) -> Vector:
+@compiled
+def printed_force(params: Any, guide: Numbers, u: Numbers) -> Vector:
     """F_1 / s of equation (1) with (2) as printed: acceleration of the tip, m/s^2.
 
     Args:
-        params: Gains and distances.
+        params: A record of `constants`.
         guide: The guide signal (12).
         u: Unit vector along R's shaft, fulcrum to tip.
     """
@@ -249,18 +251,19 @@ def printed_force(
     )
 
 
+@compiled
 def go_to_target(
-    params: GoToTargetParams,
-    v_tip: Sequence[float],
+    params: Any,
+    v_tip: Numbers,
     dt: float,
-    robot_tool: Sequence[float],
-    obstacle: Sequence[float],
-    target: Sequence[float],
-) -> tuple[Vector, list[float]]:
+    robot_tool: Numbers,
+    obstacle: Numbers,
+    target: Numbers,
+) -> tuple[Vector, tuple[float, ...]]:
     """One step of the behaviour.
 
     Args:
-        params: Parameters.
+        params: A record of `constants`.
         v_tip: v_1 / s before the step, m/s.
         dt: Length of the step, s.
         robot_tool: G_R, P_R (6), m.
@@ -272,14 +275,20 @@ def go_to_target(
         estimate of both tools the velocity runs down to zero; without a finite
         one the guide point is the tip, and the distance to O is given as 0.
     """
-    known = usable(obstacle) and usable(target) and isfinite(sum(robot_tool))
-    if not known:
-        guide = _guide_without_estimates(params, robot_tool, obstacle, target)
-        return approach(v_tip, (0.0, 0.0, 0.0), params, dt), guide
-    p = robot_tool[3:6]
-    guide = guide_point(robot_tool, obstacle, target, params.proportion_floor)
-    u = unit(sub(p, robot_tool[0:3]), (0.0, 0.0, -1.0))
-    if params.form == "printed":
+    stop = (0.0, 0.0, 0.0)
+    if not all_finite(robot_tool):
+        guide: tuple[float, ...] = stop + stop + (0.0, 1.0, 1.0) + stop
+        return approach(v_tip, stop, params, dt), guide
+    p = xyz(robot_tool, 3)
+    p_s = xyz(target, 0)
+    if not (all_finite(xyz(obstacle, 0) + fulcrum(obstacle)) and all_finite(p_s)):
+        guide = p + p + (0.0, 1.0, 1.0) + p
+        return approach(v_tip, stop, params, dt), guide
+    guide = guide_point(robot_tool, obstacle, p_s, params.proportion_floor)
+    if not (usable(obstacle) and usable(target)):
+        return approach(v_tip, stop, params, dt), guide
+    u = unit(sub(p, xyz(robot_tool, 0)), (0.0, 0.0, -1.0))
+    if params.printed:
         force = printed_force(params, guide, u)
         return limited(along(v_tip, dt, force), params.max_speed), guide
     force = corrected_force(params, guide, u)
@@ -288,25 +297,11 @@ def go_to_target(
     return approach(v_tip, goal_velocity, params, dt), guide
 
 
-def _guide_without_estimates(
-    params: GoToTargetParams,
-    robot_tool: Sequence[float],
-    obstacle: Sequence[float],
-    target: Sequence[float],
-) -> list[float]:
-    """The guide signal from what is finite, for estimates that are not usable."""
-    if not all_finite(robot_tool):
-        return [0.0] * 7 + [1.0, 1.0] + [0.0] * 3
-    if all_finite(obstacle[0:3], fulcrum(obstacle), target[0:3]):
-        return guide_point(robot_tool, obstacle, target, params.proportion_floor)
-    p = robot_tool[3:6]
-    return [*p, *p, 0.0, 1.0, 1.0, *p]
-
-
+@compiled
 def approach(
-    v_tip: Sequence[float],
-    v_balance: Sequence[float],
-    params: GoToTargetParams,
+    v_tip: Numbers,
+    v_balance: Numbers,
+    params: Any,
     dt: float,
 ) -> Vector:
     """Damped motion (4) towards the velocity at which force and damping balance.
@@ -318,6 +313,32 @@ def approach(
     change = sub(v_balance, v_tip)
     change = (share * change[0], share * change[1], share * change[2])
     return along(v_tip, 1.0, limited(change, params.max_acceleration * dt))
+
+
+def constants(params: GoToTargetParams) -> np.ndarray:
+    """The parameters as the compiled functions take them."""
+    return packed(
+        params,
+        printed=params.form == "printed",
+        slowing_distance=params.slowing_distance,
+    )
+
+
+@compiled
+def _step(
+    record: np.ndarray,
+    state: np.ndarray,
+    time: float,
+    robot_tool: np.ndarray,
+    obstacle: np.ndarray,
+    target: np.ndarray,
+) -> np.ndarray:
+    """The next state (4), v_1 (3) and the guide signal (12)."""
+    v_tip, guide = go_to_target(
+        record[0], xyz(state, 0), time - state[3], robot_tool, obstacle, target
+    )
+    v1 = along((0.0, 0.0, 0.0), guide[7], v_tip)
+    return np.array(v_tip + (time,) + v1 + guide)
 
 
 class GoToTarget(Block):
@@ -348,6 +369,7 @@ class GoToTarget(Block):
         super().__init__()
         self._params = params or GoToTargetParams()
         self._params.check()
+        self._constants = constants(self._params)
         self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
         self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
         self._target = self.vector_in("target", TARGET_EXAMPLE)
@@ -362,25 +384,16 @@ class GoToTarget(Block):
         # Both outputs and the update share one step.
         self._step = self.cached("step", self._calc_step, inputs)
         step_ticket = {self._step.ticket()}
-        self.vector_out("v1", 3, self._calc_v1, step_ticket)
-        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[1], step_ticket)
-        self.update_every(self._params.period, self._update)
+        self.vector_out("v1", 3, lambda c: self._step.Eval(c)[4:7], step_ticket)
+        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[7:], step_ticket)
+        self.update_every(self._params.period, lambda c: self._step.Eval(c)[:4])
 
-    def _calc_step(self, context: Any) -> tuple[Vector, list[float]]:
-        *v_tip, t_last = context.get_discrete_state_vector().value().tolist()
-        return go_to_target(
-            self._params,
-            v_tip,
-            context.get_time() - t_last,
-            self._robot_tool.Eval(context).tolist(),
-            self._obstacle.Eval(context).tolist(),
-            self._target.Eval(context).tolist(),
+    def _calc_step(self, context: Any) -> np.ndarray:
+        return _step(
+            self._constants,
+            context.get_discrete_state_vector().value(),
+            context.get_time(),
+            self._robot_tool.Eval(context),
+            self._obstacle.Eval(context),
+            self._target.Eval(context),
         )
-
-    def _calc_v1(self, context: Any) -> Vector:
-        v_tip, guide = self._step.Eval(context)
-        s = guide[7]
-        return s * v_tip[0], s * v_tip[1], s * v_tip[2]
-
-    def _update(self, context: Any) -> list[float]:
-        return [*self._step.Eval(context)[0], context.get_time()]

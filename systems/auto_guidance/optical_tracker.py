@@ -4,7 +4,6 @@ Section 5 of the paper: a Polaris Spectra of NDI "recovers data on surgeon's pos
 and orientation for both tools simultaneously".
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 from typing import Any
@@ -14,6 +13,8 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import BasicVector
 
 from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled, packed
+from systems.common.geometry import all_finite, along, cross, sub, unit, xyz
 
 TOOLS = ("S", "O")
 NEVER = -1.0  # s, the frame time before the first frame
@@ -121,9 +122,10 @@ class OpticalTrackerParams:
             loss.check()
 
 
+@compiled
 def disturb(
-    shaft: Sequence[float],
-    noise: Sequence[float],
+    shaft: Numbers,
+    noise: Numbers,
     lever: float,
     sigma_position: float,
     sigma_direction: float,
@@ -140,22 +142,49 @@ def disturb(
     Returns:
         Measured p_WP in m and u_W (6).
     """
-    x, y, z, ux, uy, uz = shaft
-    ex, ey, ez, rx, ry, rz = noise
     # A small rotation: u + theta x u, made a unit vector again.
-    vx = ux + sigma_direction * (ry * uz - rz * uy)
-    vy = uy + sigma_direction * (rz * ux - rx * uz)
-    vz = uz + sigma_direction * (rx * uy - ry * ux)
-    length = math.sqrt(vx * vx + vy * vy + vz * vz)
-    vx, vy, vz = vx / length, vy / length, vz / length
-    return (
-        x + sigma_position * ex + lever * (vx - ux),
-        y + sigma_position * ey + lever * (vy - uy),
-        z + sigma_position * ez + lever * (vz - uz),
-        vx,
-        vy,
-        vz,
-    )
+    u = xyz(shaft, 3)
+    v = unit(along(u, sigma_direction, cross(xyz(noise, 3), u)))
+    p = along(xyz(shaft, 0), sigma_position, xyz(noise, 0))
+    return along(p, lever, sub(v, u)) + v
+
+
+@compiled
+def _expose(
+    record: np.ndarray,
+    losses: np.ndarray,
+    line: np.ndarray,
+    noise: np.ndarray,
+    shaft_S: np.ndarray,
+    shaft_O: np.ndarray,
+    time: float,
+) -> np.ndarray:
+    """The delay line with a new frame at its end, and without its oldest."""
+    params = record[0]
+    after = np.empty(len(line))
+    after[:-16] = line[16:]
+    frame = after[-16:]
+    frame[:] = line[-16:]
+    for tool in range(2):
+        shaft = shaft_S if tool == 0 else shaft_O
+        seen = all_finite(shaft)
+        for loss in losses:
+            if loss[0] <= time < loss[1] and loss[2 + tool] > 0.0:
+                seen = False
+        at = 8 * tool
+        if seen:
+            measured = disturb(
+                shaft,
+                noise[6 * tool : 6 * tool + 6],
+                params.lever,
+                params.sigma_position,
+                params.sigma_direction,
+            )
+            for i in range(6):
+                frame[at + i] = measured[i]
+        frame[at + 6] = time
+        frame[at + 7] = 1.0 if seen else 0.0
+    return after
 
 
 class OpticalTracker(Block):
@@ -189,50 +218,40 @@ class OpticalTracker(Block):
         super().__init__()
         params = params or OpticalTrackerParams()
         params.check()
-        self._lever = params.body.lever
-        self._sigma_position = params.body.sigma_position()
-        self._sigma_direction = params.body.sigma_direction()
-        self._hidden = [
-            [(loss.start, loss.end) for loss in params.losses if tool in loss.tools]
-            for tool in TOOLS
-        ]
+        # Start, end, and whether S and O are hidden; the first one hides nothing.
+        losses = [[0.0] * 4]
+        for loss in params.losses:
+            hides = [float(tool in loss.tools) for tool in TOOLS]
+            losses.append([loss.start, loss.end, *hides])
+        self._constants = packed(
+            lever=params.body.lever,
+            sigma_position=params.body.sigma_position(),
+            sigma_direction=params.body.sigma_direction(),
+        )
+        self._losses = np.array(losses)
         example = [0.05, 0.0, -0.12, 0.0, 0.0, -1.0]
         self._shafts = [self.vector_in(tool, example) for tool in TOOLS]
         self._noise = self.DeclareVectorInputPort(
             "noise", BasicVector(np.zeros(12)), RandomDistribution.kGaussian
         )
-        # The delay line, oldest frame first: S (8) and O (8) of each frame.
+        # The delay line, oldest frame first: S (8) and O (8) of each frame. The
+        # oldest is the one that has been delivered.
         frames = max(1, math.ceil(params.latency / params.period - 1e-9))
         unseen = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, NEVER, 0.0]
         self.DeclareDiscreteState(np.array(2 * unseen * frames))
-        state = {self.xd_ticket()}
-        self.vector_out("S_measured", 8, lambda c: self._delivered(c)[:8], state)
-        self.vector_out("O_measured", 8, lambda c: self._delivered(c)[8:16], state)
-        self.update_every(params.period, self._expose)
+        self.state_out("S_measured", unseen)
+        self.state_out("O_measured", unseen)
+        self.update_every(params.period, self._update)
 
-    def _delivered(self, context: Any) -> Any:
-        return context.get_discrete_state(0).value()
-
-    def _expose(self, context: Any) -> Sequence[float]:
-        time = context.get_time()
-        line = context.get_discrete_state(0).value().tolist()
-        normal: Any = self._noise.Eval(context)
-        noise = normal.tolist()
-        frame = line[-16:]
-        for tool in (0, 1):
-            shaft = self._shafts[tool].Eval(context).tolist()
-            at = 8 * tool
-            frame[at + 6], frame[at + 7] = time, 0.0
-            if not math.isfinite(sum(shaft)):
-                continue
-            if any(start <= time < end for start, end in self._hidden[tool]):
-                continue
-            frame[at : at + 6] = disturb(
-                shaft,
-                noise[6 * tool : 6 * tool + 6],
-                self._lever,
-                self._sigma_position,
-                self._sigma_direction,
-            )
-            frame[at + 7] = 1.0
-        return line[16:] + frame
+    def _update(self, context: Any) -> tuple[np.ndarray, ...]:
+        noise: Any = self._noise.Eval(context)
+        line = _expose(
+            self._constants,
+            self._losses,
+            context.get_discrete_state(0).value(),
+            noise,
+            self._shafts[0].Eval(context),
+            self._shafts[1].Eval(context),
+            context.get_time(),
+        )
+        return line, line[:8], line[8:16]

@@ -12,27 +12,43 @@ several times better than it is measured.
 """
 
 import math
+from typing import Any
+
+import numpy as np
 
 from systems.auto_guidance.optical_tracker import MarkerBody
-from systems.common.geometry import any_perpendicular, cross
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import (
+    along,
+    any_perpendicular,
+    cross,
+    dot,
+    sub,
+    unit,
+    xyz,
+)
 
 Point = tuple[float, float, float]
 PointCovariance = tuple[float, float, float, float, float, float]
 """Of a point in W: (xx, xy, xz, yy, yz, zz) in m^2."""
 
+FIRST = -1.0
+"""Stands for the time since the frame before at the first frame."""
 _QUIET = 4e-3  # rad, that the shaft may turn before its reference direction follows
 _NEAREST = 0.05  # m, from the markers' mean: a nearer fulcrum gives no direction
 
 
+@compiled
 def lateral_variance(P: PointCovariance, u: Point) -> float:
     """Mean variance of a point across the direction u (unit vector), in m^2."""
     xx, xy, xz, yy, yz, zz = P
     ux, uy, uz = u
-    along = ux * (ux * xx + 2.0 * (uy * xy + uz * xz))
-    along += uy * (uy * yy + 2.0 * uz * yz) + uz * uz * zz
-    return max(0.5 * (xx + yy + zz - along), 0.0)
+    lengthwise = ux * (ux * xx + 2.0 * (uy * xy + uz * xz))
+    lengthwise += uy * (uy * yy + 2.0 * uz * yz) + uz * uz * zz
+    return max(0.5 * (xx + yy + zz - lengthwise), 0.0)
 
 
+@compiled
 def measure(
     p: Point, P: PointCovariance, h: Point, value: float, variance: float
 ) -> tuple[Point, PointCovariance]:
@@ -70,6 +86,7 @@ def measure(
     )
 
 
+@compiled
 def measure_line(
     p: Point,
     P: PointCovariance,
@@ -109,110 +126,101 @@ def measure_line(
     return measure(q, Q, f, f[0] * cx + f[1] * cy + f[2] * cz, variance)
 
 
-class ShaftFulcrum:
-    """Finds a tool's fulcrum, and the tip by its help; all that changes is the state.
-
-    State (12): fulcrum p_WG in m (3), its covariance (6), and the shaft's reference
-    direction (3, see `measure_line`).
+def shaft_constants(body: MarkerBody, given: list[float] | None) -> dict[str, Any]:
+    """What `absorb_line` needs to know of a tool, by name.
 
     Args:
         body: The markers on the tool.
         given: p_WG in m if it is known, or None to estimate it.
-        wall: Height of the abdominal wall in W, and its standard deviation, in m.
-        depth: Of the tip below the fulcrum when it is first seen, and its standard
-            deviation, in m.
-        drift: How fast the fulcrum may wander along each axis, in m/sqrt(s).
-        gate: A line that passes the fulcrum at more than so many standard deviations
-            belongs to another fulcrum.
     """
+    # A micrometre at least: the covariance stays regular without noise.
+    var_c = max(body.sigma_position(), 1e-6) ** 2
+    var_u = max(body.sigma_direction(), 1e-6) ** 2
+    return {
+        "lever": body.lever,
+        "var_c": var_c,
+        "var_u": var_u,
+        "var_tip": var_c + body.lever * body.lever * var_u,
+        "given": given is not None,
+        "fulcrum": np.array(given or [0.0] * 3, float),
+    }
 
-    def __init__(
-        self,
-        body: MarkerBody,
-        given: list[float] | None,
-        wall: tuple[float, float],
-        depth: tuple[float, float],
-        drift: float,
-        gate: float,
-    ) -> None:
-        # A micrometre at least: the covariance stays regular without noise.
-        self.lever = body.lever
-        self.var_c = max(body.sigma_position(), 1e-6) ** 2
-        self.var_u = max(body.sigma_direction(), 1e-6) ** 2
-        self.var_tip = self.var_c + self.lever * self.lever * self.var_u
-        self._given = given
-        self._wall, self._depth = wall, depth
-        self._drift2 = drift * drift
-        self._gate2 = gate * gate
 
-    def initial(self) -> list[float]:
-        """The state before the first frame."""
-        return [*(self._given or [0.0] * 3), *[0.0] * 8, -1.0]
+def initial_fulcrum(given: list[float] | None) -> list[float]:
+    """The state (12) before the first frame.
 
-    def absorb(
-        self, x: list[float], c: Point, u: Point, dt: float | None
-    ) -> tuple[list[float], Point, float, float]:
-        """Fuses the shaft's direction with the fulcrum's, and refines the fulcrum.
+    Fulcrum p_WG in m (3), its covariance (6), and the shaft's reference direction (3,
+    see `measure_line`).
+    """
+    return [*(given or [0.0] * 3), *[0.0] * 8, -1.0]
 
-        Args:
-            x: State (12).
-            c: Measured mean of the markers in m.
-            u: Measured direction of the shaft, a unit vector.
-            dt: Time since the frame before in s, or None at the first frame.
 
-        Returns:
-            The state after the frame; the fused tip in m; the variance along each
-            axis in m^2 of its noise, and of the error it takes over from the
-            fulcrum: that one is slow, so that no filtering reduces it.
-        """
-        cx, cy, cz = c
-        ux, uy, uz = u
-        g: Point = (x[0], x[1], x[2])
-        P: PointCovariance = (x[3], x[4], x[5], x[6], x[7], x[8])
-        r: Point = (x[9], x[10], x[11])
-        first = self._given is None and dt is None
-        if first:
-            (g, P), r = self._beforehand(c, u), u
-        elif self._given is None and dt is not None:
-            q = self._drift2 * dt
-            P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
-        dx, dy, dz = g[0] - cx, g[1] - cy, g[2] - cz
-        d2 = dx * dx + dy * dy + dz * dz
-        along = dx * ux + dy * uy + dz * uz
-        var_g = lateral_variance(P, u)
-        var_line = self.var_c + d2 * self.var_u
-        wx, wy, wz = u
-        variance, shared = self.var_tip, 0.0
-        if d2 - along * along > self._gate2 * (var_line + var_g):
-            if self._given is None:  # another fulcrum: begin again
-                (g, P), r = self._beforehand(c, u), u
-        elif along > _NEAREST and not first:
-            distance = math.sqrt(d2)
-            dx, dy, dz = dx / distance, dy / distance, dz / distance
-            weight = d2 * self.var_u / (var_line + var_g)
-            rest = 1.0 - weight
-            wx = rest * ux + weight * dx
-            wy = rest * uy + weight * dy
-            wz = rest * uz + weight * dz
-            ratio = weight * self.lever / distance
-            variance = (1.0 - ratio) ** 2 * self.var_c
-            variance += (rest * self.lever) ** 2 * self.var_u
-            variance = max(variance, self.var_c)  # along the shaft
-            shared = ratio * ratio * var_g
-            if dx * r[0] + dy * r[1] + dz * r[2] < 1.0 - 0.5 * _QUIET * _QUIET:
-                r = (dx, dy, dz)
-        if self._given is None:
-            g, P = measure_line(g, P, c, u, r, var_line)
-        k = self.lever / math.sqrt(wx * wx + wy * wy + wz * wz)
-        tip = (cx + k * wx, cy + k * wy, cz + k * wz)
-        return [*g, *P, *r], tip, variance, shared
+@compiled
+def expected_fulcrum(params: Any, c: Point, u: Point) -> tuple[Point, PointCovariance]:
+    """The fulcrum that is expected of a shaft when nothing else is known."""
+    g = along(c, params.lever - params.depth, u)
+    var = params.sigma_depth**2
+    P = (var, 0.0, 0.0, var, 0.0, var)
+    sigma = params.sigma_wall
+    return measure(g, P, (0.0, 0.0, 1.0), params.wall_height, sigma * sigma)
 
-    def _beforehand(self, c: Point, u: Point) -> tuple[Point, PointCovariance]:
-        """The fulcrum that is expected of a shaft when nothing else is known."""
-        height, sigma_wall = self._wall
-        depth, sigma_depth = self._depth
-        up = self.lever - depth
-        g = (c[0] + up * u[0], c[1] + up * u[1], c[2] + up * u[2])
-        var = sigma_depth**2
-        P = (var, 0.0, 0.0, var, 0.0, var)
-        return measure(g, P, (0.0, 0.0, 1.0), height, sigma_wall**2)
+
+@compiled
+def absorb_line(
+    params: Any, x: Numbers, c: Point, u: Point, dt: float
+) -> tuple[tuple[float, ...], Point, float, float]:
+    """Fuses the shaft's direction with the fulcrum's, and refines the fulcrum.
+
+    Args:
+        params: A record with `shaft_constants` and what is known beforehand; a line
+            that passes the fulcrum at more than `gate` standard deviations belongs to
+            another fulcrum.
+        x: State (12), see `initial_fulcrum`.
+        c: Measured mean of the markers in m.
+        u: Measured direction of the shaft, a unit vector.
+        dt: Time since the frame before in s, or `FIRST` at the first frame.
+
+    Returns:
+        The state after the frame; the fused tip in m; the variance along each
+        axis in m^2 of its noise, and of the error it takes over from the
+        fulcrum: that one is slow, so that no filtering reduces it.
+    """
+    lever, var_c, var_u = params.lever, params.var_c, params.var_u
+    g = xyz(x, 0)
+    P = (x[3], x[4], x[5], x[6], x[7], x[8])
+    r = xyz(x, 9)
+    is_first = not params.given and dt < 0.0
+    if is_first:
+        g, P = expected_fulcrum(params, c, u)
+        r = u
+    elif not params.given:
+        q = params.fulcrum_drift * params.fulcrum_drift * dt
+        P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
+    d = sub(g, c)
+    d2 = dot(d, d)
+    ahead = dot(d, u)
+    var_g = lateral_variance(P, u)
+    var_line = var_c + d2 * var_u
+    w = u
+    variance, shared = params.var_tip, 0.0
+    if d2 - ahead * ahead > params.gate * params.gate * (var_line + var_g):
+        if not params.given:  # another fulcrum: begin again
+            g, P = expected_fulcrum(params, c, u)
+            r = u
+    elif ahead > _NEAREST and not is_first:
+        distance = math.sqrt(d2)
+        e = unit(d)
+        weight = d2 * var_u / (var_line + var_g)
+        rest = 1.0 - weight
+        w = along((rest * u[0], rest * u[1], rest * u[2]), weight, e)
+        ratio = weight * lever / distance
+        variance = (1.0 - ratio) ** 2 * var_c
+        variance += (rest * lever) ** 2 * var_u
+        variance = max(variance, var_c)  # along the shaft
+        shared = ratio * ratio * var_g
+        if dot(e, r) < 1.0 - 0.5 * _QUIET * _QUIET:
+            r = e
+    if not params.given:
+        g, P = measure_line(g, P, c, u, r, var_line)
+    tip = along(c, lever, unit(w))
+    return g + P + r, tip, variance, shared

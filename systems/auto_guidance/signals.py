@@ -7,8 +7,8 @@ sigma_p, sigma_v, sigma_a, known (1 or 0), age of the last valid frame.
 World frame, SI units.
 """
 
-from collections.abc import Sequence
-from math import isfinite
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, all_finite, xyz
 
 ROBOT_TOOL_EXAMPLE = [0.0, 0.0, 0.0, 0.02, 0.0, -0.12]
 """A robot's instrument, 0.12 m inside."""
@@ -31,6 +31,18 @@ OBSTACLE_EXAMPLE = [
 ]
 """An estimate of the obstacle tool O, crossing at 30 mm/s."""
 
+CAMERA_EXAMPLE = [
+    *(-0.01, -0.05, -0.08),
+    *(0.0, 0.0, 0.0),
+    *(0.0, 0.0, 0.0),
+    *(0.02, -0.1, 0.0),
+    *(0.0, 0.0, 0.0, 1.0, 0.0),
+]
+"""What is known of the endoscope, at rest; same shape as an estimate."""
+
+VIEW_CONE_EXAMPLE = [0.02, -0.1, 0.0, -0.41, 0.55, -0.727, 0.6]
+"""A view cone: apex, axis, half angle."""
+
 GUIDE_EXAMPLE = [
     *(0.012, 0.0, -0.072),
     *(-0.01, 0.02, -0.08),
@@ -40,22 +52,25 @@ GUIDE_EXAMPLE = [
 """A guide point 0.03 m from the obstacle tool."""
 
 
-def velocity(estimate: Sequence[float]) -> Sequence[float]:
+@compiled
+def velocity(estimate: Numbers) -> Vector:
     """v_WP of an estimate, m/s."""
-    return estimate[3:6]
+    return xyz(estimate, 3)
 
 
-def acceleration(estimate: Sequence[float]) -> Sequence[float]:
+@compiled
+def acceleration(estimate: Numbers) -> Vector:
     """a_WP of an estimate, m/s^2."""
-    return estimate[6:9]
+    return xyz(estimate, 6)
 
 
-def fulcrum(estimate: Sequence[float]) -> Sequence[float]:
+@compiled
+def fulcrum(estimate: Numbers) -> Vector:
     """p_WG of an estimate, m."""
-    return estimate[9:12]
+    return xyz(estimate, 9)
 
 
-def usable(estimate: Sequence[float]) -> bool:
+@compiled
+def usable(estimate: Numbers) -> bool:
     """True if the estimator knows the tool and gives numbers only."""
-    # A sum with a NaN or an infinity in it is never finite.
-    return estimate[15] > 0.5 and isfinite(sum(estimate))
+    return estimate[15] > 0.5 and all_finite(estimate)

@@ -1,4 +1,4 @@
-"""Singer's model of a moving hand, and a Kalman filter over it in plain floats.
+"""Singer's model of a moving hand, and a Kalman filter over it.
 
 Along each axis the state is position, velocity and acceleration; the acceleration is
 a first-order Markov process of time constant 1/alpha and standard deviation sigma
@@ -8,9 +8,12 @@ one covariance, whose six entries are (pp, pv, pa, vv, va, aa).
 
 import math
 
+from systems.common.compiled import compiled
+
 Covariance = tuple[float, float, float, float, float, float]
 
 
+@compiled
 def predict_covariance(
     P: Covariance, dt: float, alpha: float, sigma: float
 ) -> Covariance:
@@ -51,6 +54,7 @@ def predict_covariance(
     )
 
 
+@compiled
 def gains(dt: float, alpha: float) -> tuple[float, float, float]:
     """What a unit of acceleration gives after `dt`: position, velocity, itself.
 
@@ -61,6 +65,7 @@ def gains(dt: float, alpha: float) -> tuple[float, float, float]:
     return (x - 1.0 + e) / (alpha * alpha), (1.0 - e) / alpha, e
 
 
+@compiled
 def correct_covariance(
     P: Covariance, variance: float
 ) -> tuple[Covariance, tuple[float, float, float]]:

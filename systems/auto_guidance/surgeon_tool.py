@@ -9,16 +9,22 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+import numpy as np
+
 from systems.auto_guidance.recording import load_recording
 from systems.auto_guidance.tool_motion import (
     Motion,
     Push,
+    evaluate,
     push_motion,
     recorded_motion,
+    total,
     tremor_motion,
     waypoint_motion,
 )
 from systems.common.block import Block
+from systems.common.compiled import compiled
+from systems.common.geometry import Vector, sub, unit
 
 _LEAST_DEPTH = 0.005  # m, of a tip below its fulcrum
 
@@ -97,23 +103,17 @@ def tip_motion(params: SurgeonToolParams) -> Motion:
         recorded, path = load_recording(params.recording)
         base = recorded_motion(recorded, path)
         key_times = recorded.tolist()
-    extras = [push_motion(push) for push in params.pushes]
+    motions = [base, *map(push_motion, params.pushes)]
     if params.tremor_rms > 0.0:
-        extras.append(tremor_motion(params.tremor_rms, params.tremor_seed))
-
-    def motion(t: float) -> tuple[float, float, float, float, float, float]:
-        x, y, z, u, v, w = base(t)
-        for extra in extras:
-            dx, dy, dz, du, dv, dw = extra(t)
-            x, y, z, u, v, w = x + dx, y + dy, z + dz, u + du, v + dv, w + dw
-        return x, y, z, u, v, w
+        motions.append(tremor_motion(params.tremor_rms, params.tremor_seed))
+    motion = total(motions)
 
     # The tip is highest at a waypoint, at a sample, or while a push is held.
     for push in params.pushes:
         key_times += [push.start + push.span(), push.start + push.span() + push.hold]
     ceiling = params.p_WG[2] - _LEAST_DEPTH
     for t in key_times:
-        z = motion(t)[2]
+        z = motion(float(t))[2]
         if z > ceiling:
             source = params.recording or "its waypoints and pushes"
             raise ValueError(
@@ -122,6 +122,15 @@ def tip_motion(params: SurgeonToolParams) -> Motion:
                 f"valid z is {ceiling:.4f} m"
             )
     return motion
+
+
+@compiled
+def _shaft(
+    knots: np.ndarray, pieces: np.ndarray, waves: np.ndarray, p_WG: Vector, t: float
+) -> np.ndarray:
+    x, y, z, _, _, _ = evaluate(knots, pieces, waves, t)
+    p = (x, y, z)
+    return np.array(p + unit(sub(p, p_WG)))
 
 
 class SurgeonTool(Block):
@@ -144,17 +153,17 @@ class SurgeonTool(Block):
         super().__init__()
         params = params or SurgeonToolParams()
         self._motion = tip_motion(params)
-        self._p_WG = tuple(params.p_WG)
+        x, y, z = params.p_WG
+        self._p_WG = (float(x), float(y), float(z))
         time = {self.time_ticket()}
         self.vector_out("shaft", 6, self._calc_shaft, time)
         self.vector_out("tip_velocity", 3, self._calc_velocity, time)
 
-    def _calc_shaft(self, context: Any) -> Sequence[float]:
-        x, y, z, _, _, _ = self._motion(context.get_time())
-        gx, gy, gz = self._p_WG
-        ux, uy, uz = x - gx, y - gy, z - gz
-        length = math.sqrt(ux * ux + uy * uy + uz * uz)
-        return x, y, z, ux / length, uy / length, uz / length
+    def _calc_shaft(self, context: Any) -> np.ndarray:
+        motion = self._motion
+        return _shaft(
+            motion.knots, motion.pieces, motion.waves, self._p_WG, context.get_time()
+        )
 
-    def _calc_velocity(self, context: Any) -> Sequence[float]:
-        return self._motion(context.get_time())[3:]
+    def _calc_velocity(self, context: Any) -> np.ndarray:
+        return np.array(self._motion(context.get_time())[3:])

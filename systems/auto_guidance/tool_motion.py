@@ -1,19 +1,20 @@
 """How a surgeon's hand moves a tool's tip: waypoints, a recording, pushes, tremor.
 
-A motion is a function of time that gives position and velocity; motions add up.
+A motion is a function of time that gives position and velocity; motions add up. It
+is a sum of piecewise polynomials and sinusoids, and all of it is in arrays.
 """
 
-from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-Motion = Callable[[float], tuple[float, float, float, float, float, float]]
-"""Time in s to position in m (x, y, z) and velocity in m/s (x, y, z)."""
+from systems.common.compiled import compiled
 
+_DEGREE = 5
 _TREMOR_WAVES = 3  # sinusoids; each axis has its own phases
 
 
@@ -51,37 +52,95 @@ class Push:
             raise ValueError(f"push: speed={self.speed} m/s must be finite and > 0")
 
 
-def _blend(s: float) -> tuple[float, float]:
-    """Minimum jerk from 0 to 1 for s in [0, 1]: value and derivative (Flash 1985)."""
-    if s <= 0.0:
-        return 0.0, 0.0
-    if s >= 1.0:
-        return 1.0, 0.0
-    s2 = s * s
-    return s2 * s * (10.0 - 15.0 * s + 6.0 * s2), 30.0 * s2 * (1.0 - s) ** 2
+@compiled
+def evaluate(
+    knots: np.ndarray, pieces: np.ndarray, waves: np.ndarray, t: float
+) -> tuple[float, float, float, float, float, float]:
+    """Position in m (x, y, z) and velocity in m/s of a motion at time t in s.
+
+    Args:
+        knots: Of each path, in s, increasing; padded with infinities (paths x n).
+        pieces: Coefficients, constant first, of the time since the knot before
+            (paths x n + 1 x 3 x 6).
+        waves: Amplitude in m, rate in rad/s and three phases in rad (m x 5).
+        t: In s.
+    """
+    x = np.zeros(6)
+    for k in range(len(knots)):
+        i = int(np.searchsorted(knots[k], t, side="right"))
+        s = t - knots[k, max(i - 1, 0)]
+        for axis in range(3):
+            c: Any = pieces[k, i, axis]
+            value = slope = 0.0
+            for power in range(_DEGREE, -1, -1):
+                slope = slope * s + value
+                value = value * s + c[power]
+            x[axis] += value
+            x[3 + axis] += slope
+    for wave in waves:
+        for axis in range(3):
+            angle = wave[1] * t + wave[2 + axis]
+            x[axis] += wave[0] * math.sin(angle)
+            x[3 + axis] += wave[0] * wave[1] * math.cos(angle)
+    return x[0], x[1], x[2], x[3], x[4], x[5]
 
 
-def waypoint_motion(times: list[float], points: list[list[float]]) -> Motion:
-    """Minimum jerk from waypoint to waypoint, at rest at each.
+@dataclass(frozen=True)
+class Motion:
+    """A motion; call it with a time in s for position in m and velocity in m/s.
+
+    Attributes:
+        knots: As `evaluate` takes them.
+        pieces: Likewise.
+        waves: Likewise.
+    """
+
+    knots: np.ndarray
+    pieces: np.ndarray
+    waves: np.ndarray
+
+    def __call__(self, t: float) -> tuple[float, float, float, float, float, float]:
+        """Position (x, y, z) and velocity (x, y, z) at time t."""
+        return evaluate(self.knots, self.pieces, self.waves, t)
+
+
+def total(motions: Sequence[Motion]) -> Motion:
+    """The sum of motions."""
+    count = sum(len(motion.knots) for motion in motions)
+    most = max(motion.knots.shape[1] for motion in motions)
+    knots = np.full((count, most), np.inf)
+    pieces = np.zeros((count, most + 1, 3, _DEGREE + 1))
+    row = 0
+    for motion in motions:
+        n, m = motion.knots.shape
+        knots[row : row + n, :m] = motion.knots
+        pieces[row : row + n, : m + 1] = motion.pieces
+        row += n
+    return Motion(knots, pieces, np.vstack([motion.waves for motion in motions]))
+
+
+def _path(times: Sequence[float], pieces: np.ndarray) -> Motion:
+    knots = np.array(times, float)[None]
+    return Motion(knots, pieces[None], np.zeros((0, 5)))
+
+
+def waypoint_motion(times: Sequence[float], points: Sequence[Any]) -> Motion:
+    """Minimum jerk from waypoint to waypoint, at rest at each (Flash 1985).
 
     Args:
         times: In s, increasing.
         points: In m, one of three elements for each time.
     """
-
-    def motion(t: float) -> tuple[float, float, float, float, float, float]:
-        i = bisect_right(times, t)
-        if i == 0 or i == len(times):
-            x, y, z = points[max(i - 1, 0)]
-            return x, y, z, 0.0, 0.0, 0.0
-        (x, y, z), (x1, y1, z1) = points[i - 1], points[i]
-        span = times[i] - times[i - 1]
-        w, dw = _blend((t - times[i - 1]) / span)
-        dw /= span
-        dx, dy, dz = x1 - x, y1 - y, z1 - z
-        return x + w * dx, y + w * dy, z + w * dz, dw * dx, dw * dy, dw * dz
-
-    return motion
+    n = len(times)
+    pieces = np.zeros((n + 1, 3, _DEGREE + 1))
+    pieces[0, :, 0] = points[0]
+    pieces[1:, :, 0] = points
+    for i in range(n - 1):
+        span = times[i + 1] - times[i]
+        way = np.subtract(points[i + 1], points[i])
+        for power, share in ((3, 10.0), (4, -15.0), (5, 6.0)):
+            pieces[i + 1, :, power] = share * way / span**power
+    return _path(times, pieces)
 
 
 def recorded_motion(times: np.ndarray, points: np.ndarray) -> Motion:
@@ -94,51 +153,28 @@ def recorded_motion(times: np.ndarray, points: np.ndarray) -> Motion:
         times: In s, shape (n,), increasing.
         points: In m, shape (n, 3).
     """
-    # Coefficients (cubic first) of each interval as plain floats: 12 in a row.
-    coefficients = PchipInterpolator(times, points).c  # (4, n - 1, 3)
-    rows = coefficients.transpose(1, 2, 0).reshape(len(times) - 1, 12).tolist()
-    knots = times.tolist()
-    ends = points[0].tolist(), points[-1].tolist()
-
-    def motion(t: float) -> tuple[float, float, float, float, float, float]:
-        i = bisect_right(knots, t)
-        if i == 0 or i == len(knots):
-            x, y, z = ends[i > 0]
-            return x, y, z, 0.0, 0.0, 0.0
-        a, b, c, d, e, f, g, h, k, m, n, o = rows[i - 1]
-        s = t - knots[i - 1]
-        return (
-            ((a * s + b) * s + c) * s + d,
-            ((e * s + f) * s + g) * s + h,
-            ((k * s + m) * s + n) * s + o,
-            (3.0 * a * s + 2.0 * b) * s + c,
-            (3.0 * e * s + 2.0 * f) * s + g,
-            (3.0 * k * s + 2.0 * m) * s + n,
-        )
-
-    return motion
+    n = len(times)
+    pieces = np.zeros((n + 1, 3, _DEGREE + 1))
+    pieces[0, :, 0], pieces[n, :, 0] = points[0], points[-1]
+    coefficients = PchipInterpolator(times, points).c  # cubic first, (4, n - 1, 3)
+    pieces[1:n, :, :4] = coefficients[::-1].transpose(1, 2, 0)
+    return _path(times.tolist(), pieces)
 
 
 def push_motion(push: Push) -> Motion:
     """Displacement and velocity of a push: out, hold, and back."""
-    length = math.hypot(*push.direction)
-    dx, dy, dz = (push.distance * d / length for d in push.direction)
-    span = push.span()
-    back = push.start + span + push.hold
-    end = back + span
-
-    def motion(t: float) -> tuple[float, float, float, float, float, float]:
-        if t <= push.start or t >= end:
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        if t < back:
-            w, dw = _blend((t - push.start) / span)
-        else:
-            w, dw = _blend((end - t) / span)
-            dw = -dw
-        dw /= span
-        return w * dx, w * dy, w * dz, dw * dx, dw * dy, dw * dz
-
-    return motion
+    reach = push.distance / math.hypot(*push.direction) * np.array(push.direction)
+    span, rest = push.span(), np.zeros(3)
+    times, points = [push.start], [rest]
+    if span > 0.0:
+        times += [push.start + span]
+        points += [reach]
+        if push.hold > 0.0:
+            times += [push.start + span + push.hold]
+            points += [reach]
+        times += [times[-1] + span]
+        points += [rest]
+    return waypoint_motion(times, points)
 
 
 def tremor_motion(rms: float, seed: int) -> Motion:
@@ -151,21 +187,7 @@ def tremor_motion(rms: float, seed: int) -> Motion:
     rng = np.random.default_rng(seed)
     rates = 2.0 * math.pi * rng.uniform(8.0, 12.0, (_TREMOR_WAVES, 1))
     phases = rng.uniform(0.0, 2.0 * math.pi, (_TREMOR_WAVES, 3))
-    waves = np.hstack([rates, phases]).tolist()
     amplitude = rms * math.sqrt(2.0 / (3.0 * _TREMOR_WAVES))
-    sin, cos = math.sin, math.cos
-
-    def motion(t: float) -> tuple[float, float, float, float, float, float]:
-        x = y = z = u = v = w = 0.0
-        for rate, a, b, c in waves:
-            k, turn = amplitude * rate, rate * t
-            a, b, c = a + turn, b + turn, c + turn
-            x += amplitude * sin(a)
-            y += amplitude * sin(b)
-            z += amplitude * sin(c)
-            u += k * cos(a)
-            v += k * cos(b)
-            w += k * cos(c)
-        return x, y, z, u, v, w
-
-    return motion
+    amplitudes = np.full((_TREMOR_WAVES, 1), amplitude)
+    pieces = np.zeros((0, 1, 3, _DEGREE + 1))
+    return Motion(np.zeros((0, 0)), pieces, np.hstack([amplitudes, rates, phases]))

@@ -15,8 +15,21 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+import numpy as np
+
 from systems.common.block import Block
-from systems.common.geometry import Vector
+from systems.common.compiled import Numbers, compiled, packed
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    dot,
+    limited,
+    norm,
+    sub,
+    unit,
+    xyz,
+)
 
 MOVING = 0
 WAITING = 7
@@ -30,8 +43,15 @@ REASONS = {
     5: "target outside the view cone",
     6: "arm does not follow",
     7: "waiting for the tracker's first frame",
+    8: "force on the wall over its limit",
+    9: "wrist sensor lost",
+    10: "probing the wall",
 }
 """Why the robot stands: the code on port ``stop`` and its text."""
+
+
+_FREE = np.array([1.0, 0.0])
+"""What the passive wrist permits where there is none."""
 
 
 @dataclass
@@ -83,37 +103,61 @@ class ToolNavigationParams:
             )
 
 
-def unit(x: float, y: float, z: float) -> tuple[Vector, float]:
-    """A vector's direction and length; the direction of zero is downwards."""
-    length = math.sqrt(x * x + y * y + z * z)
-    if length < 1e-12:
-        return (0.0, 0.0, -1.0), 0.0
-    return (x / length, y / length, z / length), length
+_DOWN = (0.0, 0.0, -1.0)
+"""The shaft's direction where it has none."""
 
 
-def reachable(
-    params: ToolNavigationParams, p_WG: Sequence[float], p_WP: Sequence[float]
-) -> bool:
-    """Whether the tool through fulcrum p_WG can have its tip at p_WP (both in W)."""
-    u, length = unit(p_WP[0] - p_WG[0], p_WP[1] - p_WG[1], p_WP[2] - p_WG[2])
-    return params.min_insertion <= length <= params.max_insertion and -u[2] >= math.cos(
-        params.max_tilt
-    )
+def constants(params: ToolNavigationParams) -> np.ndarray:
+    """The parameters as the compiled functions take them.
+
+    Raises:
+        ValueError: For a value that makes no sense.
+    """
+    params.check()
+    return packed(params)
 
 
-def cone_angle(view_cone: Sequence[float], p_WP: Sequence[float]) -> float:
+@compiled
+def reachable(params: Any, p_WG: Numbers, p_WP: Numbers) -> bool:
+    """Whether the tool through fulcrum p_WG can have its tip at p_WP (both in W).
+
+    Args:
+        params: A record of `constants`.
+        p_WG: In m.
+        p_WP: In m.
+    """
+    shaft = sub(p_WP, p_WG)
+    is_long_enough = params.min_insertion <= norm(shaft) <= params.max_insertion
+    return is_long_enough and -unit(shaft, _DOWN)[2] >= math.cos(params.max_tilt)
+
+
+@compiled
+def cone_angle(view_cone: Numbers, p_WP: Numbers) -> float:
     """Angle [rad] of a point to the axis of a view cone (apex, axis, half angle)."""
-    a, _ = unit(p_WP[0] - view_cone[0], p_WP[1] - view_cone[1], p_WP[2] - view_cone[2])
-    cosine = a[0] * view_cone[3] + a[1] * view_cone[4] + a[2] * view_cone[5]
+    cosine = dot(unit(sub(p_WP, xyz(view_cone, 0)), _DOWN), xyz(view_cone, 3))
     return math.acos(min(1.0, max(-1.0, cosine)))
 
 
+@compiled
+def held(params: Any, v: Vector, n: Vector, room: float) -> Vector:
+    """A tip velocity before a border: what leads outwards too fast is taken away.
+
+    Args:
+        params: A record of `constants`.
+        v: Velocity [m/s].
+        n: The border's outward normal.
+        room: How far it is to the border [m].
+    """
+    room = max(0.0, room)
+    # What can still be braked, and no more than the room itself in a period.
+    allowed = min(math.sqrt(params.acceleration * room), room / params.period)
+    excess = dot(v, n) - allowed
+    return along(v, -excess, n) if excess > 0.0 else v
+
+
+@compiled
 def limit_tip_velocity(
-    params: ToolNavigationParams,
-    p_WG: Vector,
-    p_WP: Vector,
-    v_WP: Vector,
-    view_cone: Sequence[float],
+    params: Any, p_WG: Numbers, p_WP: Numbers, v_WP: Numbers, view_cone: Numbers
 ) -> Vector:
     """Brings a tip velocity within the tool's limits.
 
@@ -121,7 +165,7 @@ def limit_tip_velocity(
     or view cone the part that leads outwards is taken away.
 
     Args:
-        params: The limits.
+        params: A record of `constants`.
         p_WG: Fulcrum in W [m].
         p_WP: Tip in W [m].
         v_WP: Wanted velocity of the tip in W [m/s].
@@ -130,62 +174,109 @@ def limit_tip_velocity(
     Returns:
         The limited velocity in W [m/s].
     """
-    u, q = unit(p_WP[0] - p_WG[0], p_WP[1] - p_WG[1], p_WP[2] - p_WG[2])
-    vx, vy, vz = v_WP
-    speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-    along = vx * u[0] + vy * u[1] + vz * u[2]
-    turning = math.sqrt(max(0.0, speed * speed - along * along))
+    shaft = sub(p_WP, p_WG)
+    q = norm(shaft)
+    u = unit(shaft, _DOWN)
+    speed = norm(v_WP)
+    lengthwise = dot(v_WP, u)
+    turning = math.sqrt(max(0.0, speed * speed - lengthwise * lengthwise))
     scale = 1.0
     if speed > params.tip_speed:
         scale = params.tip_speed / speed
     if turning * scale > params.turning_speed * q:
         scale = params.turning_speed * q / turning
-    vx, vy, vz, along = vx * scale, vy * scale, vz * scale, along * scale
+    v = (v_WP[0] * scale, v_WP[1] * scale, v_WP[2] * scale)
     # Each border is a half-space: outward normal and the room left before it.
-    borders = [(u, params.max_insertion - q)]
-    borders.append(((-u[0], -u[1], -u[2]), q - params.min_insertion))
+    v = held(params, v, u, params.max_insertion - q)
+    v = held(params, v, (-u[0], -u[1], -u[2]), q - params.min_insertion)
     tilt = math.acos(min(1.0, max(-1.0, -u[2])))
-    outwards, lateral = unit(u[0], u[1], 0.0)
-    if lateral > 1e-6:
+    lateral = (u[0], u[1], 0.0)
+    if norm(lateral) > 1e-6:
         # The direction in which the tip tilts further, perpendicular to the shaft.
+        x, y, _ = unit(lateral)
         cosine = math.cos(tilt)
-        normal = (outwards[0] * cosine, outwards[1] * cosine, math.sin(tilt))
-        borders.append((normal, (params.max_tilt - tilt) * q))
-    a, range_C = unit(
-        p_WP[0] - view_cone[0], p_WP[1] - view_cone[1], p_WP[2] - view_cone[2]
-    )
-    cosine = a[0] * view_cone[3] + a[1] * view_cone[4] + a[2] * view_cone[5]
-    off, _ = unit(
-        a[0] - cosine * view_cone[3],
-        a[1] - cosine * view_cone[4],
-        a[2] - cosine * view_cone[5],
-    )
+        outwards = (x * cosine, y * cosine, math.sin(tilt))
+        v = held(params, v, outwards, (params.max_tilt - tilt) * q)
+    axis = xyz(view_cone, 3)
+    ray = sub(p_WP, xyz(view_cone, 0))
+    a = unit(ray, _DOWN)
+    off = unit(along(a, -dot(a, axis), axis), _DOWN)
     half = view_cone[6] - params.cone_margin
     # The cone's outward normal: off axis, tilted back by the half angle.
-    normal = (
-        off[0] * math.cos(half) - view_cone[3] * math.sin(half),
-        off[1] * math.cos(half) - view_cone[4] * math.sin(half),
-        off[2] * math.cos(half) - view_cone[5] * math.sin(half),
-    )
-    angle = math.acos(min(1.0, max(-1.0, cosine)))
-    borders.append((normal, range_C * math.sin(half - angle)))
-    for n, room in borders:
-        outward = vx * n[0] + vy * n[1] + vz * n[2]
-        room = max(0.0, room)
-        # What can still be braked, and no more than the room itself in a period.
-        allowed = min(math.sqrt(params.acceleration * room), room / params.period)
-        if outward > allowed:
-            excess = outward - allowed
-            vx, vy, vz = vx - excess * n[0], vy - excess * n[1], vz - excess * n[2]
-    return vx, vy, vz
+    cosine = math.cos(half)
+    straight = (off[0] * cosine, off[1] * cosine, off[2] * cosine)
+    outwards = along(straight, -math.sin(half), axis)
+    room = norm(ray) * math.sin(half - cone_angle(view_cone, p_WP))
+    return held(params, v, outwards, room)
 
 
-def approach(v: Vector, wanted: Vector, change: float) -> Vector:
-    """Moves a velocity towards a wanted one by at most `change` [m/s]."""
-    d, length = unit(wanted[0] - v[0], wanted[1] - v[1], wanted[2] - v[2])
-    if length <= change:
-        return wanted
-    return v[0] + change * d[0], v[1] + change * d[1], v[2] + change * d[2]
+@compiled
+def why_stop(
+    params: Any,
+    v_R: Numbers,
+    guide: Numbers,
+    robot: Numbers,
+    obstacle: Numbers,
+    target: Numbers,
+    view_cone: Numbers,
+    p: Vector,
+) -> int:
+    """Why the tool must stop, or MOVING; the block's inputs and the commanded tip."""
+    if target[12] >= NEVER_SEEN or obstacle[12] >= NEVER_SEEN:
+        return WAITING
+    if target[15] < 0.5:
+        return 1
+    if obstacle[15] < 0.5:
+        return 2
+    numbers = all_finite(v_R) and all_finite(guide) and all_finite(robot)
+    p_WS = xyz(target, 0)
+    if not (numbers and all_finite(view_cone) and all_finite(p_WS)):
+        return 3
+    if not reachable(params, xyz(robot, 0), p_WS):
+        return 4
+    if cone_angle(view_cone, p_WS) > view_cone[6]:
+        return 5
+    if norm(sub(p, xyz(robot, 3))) > params.follow_error:
+        return 6
+    return MOVING
+
+
+@compiled
+def _update(
+    record: np.ndarray,
+    old: np.ndarray,
+    time: float,
+    v_R: np.ndarray,
+    guide: np.ndarray,
+    robot: np.ndarray,
+    obstacle: np.ndarray,
+    target: np.ndarray,
+    view_cone: np.ndarray,
+    permission: np.ndarray,
+) -> np.ndarray:
+    """The next state: the command `tool` (13), and why it stands (1)."""
+    params = record[0]
+    # The tip has moved on since the last instant.
+    v = xyz(old, 6)
+    p = along(xyz(old, 0), time - old[12], v)
+    stop = why_stop(params, v_R, guide, robot, obstacle, target, view_cone, p)
+    if stop == MOVING and not permission[0] > 0.0:
+        stop = int(permission[1])
+    p_WG = xyz(robot, 0)
+    if not all_finite(p_WG):
+        p_WG = sub(p, xyz(old, 3))
+    wanted = (0.0, 0.0, 0.0)
+    if stop == MOVING:
+        s = max(guide[7], params.min_proportion)
+        wanted = (v_R[0] / s, v_R[1] / s, v_R[2] / s)
+        wanted = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
+    change = limited(sub(wanted, v), params.acceleration * params.period)
+    v = along(v, 1.0, change)
+    shaft = sub(p, p_WG)
+    u, q = unit(shaft, _DOWN), norm(shaft)
+    across = along(v, -dot(v, u), u)
+    du = (across[0] / q, across[1] / q, across[2] / q)
+    return np.array(p + u + v + du + (time, float(stop)))
 
 
 class ToolNavigation(Block):
@@ -208,6 +299,10 @@ class ToolNavigation(Block):
 
     Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
 
+    Port ``permission`` accepts the share of its speed that the passive wrist allows,
+    0 for none, and why it must wait, a key of `REASONS` or 0 (2); free without a wire.
+    The share itself is kept before the evasion of tools, by the clearance constraint.
+
     Port ``tool`` emits the commanded p_WP [m], shaft direction u_W, v_WP [m/s],
     du_W/dt [1/s] and the time [s] they hold at (13).
 
@@ -224,7 +319,7 @@ class ToolNavigation(Block):
         """Makes the block with the tool's tip at p_WP and its fulcrum at p_WG [m]."""
         super().__init__()
         self._params = params or ToolNavigationParams()
-        self._params.check()
+        self._constants = constants(self._params)
         tool = [*p_WG, *p_WP]
         estimate = [
             0.03,
@@ -250,79 +345,24 @@ class ToolNavigation(Block):
         self._view_cone = self.vector_in(
             "view_cone", [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.6]
         )
-        u, _ = unit(p_WP[0] - p_WG[0], p_WP[1] - p_WG[1], p_WP[2] - p_WG[2])
-        state = self.DeclareDiscreteState([*p_WP, *u, *[0.0] * 6, 0.0, MOVING])
-        self.vector_out("tool", 13, self._calc_tool, {self.xd_ticket()})
-        self.vector_out("stop", 1, self._calc_stop, {self.xd_ticket()})
-        self._state = state
-        self.update_every(self._params.period, self._update)
+        self._permission = self.vector_in("permission", _FREE.tolist())
+        u = unit(sub(tuple(p_WP), tuple(p_WG)), _DOWN)
+        self._command = self.state_out("tool", [*p_WP, *u, *[0.0] * 7])
+        self.state_out("stop", [MOVING])
+        self.update_every(self._params.period, self._next)
 
-    def _calc_tool(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(self._state).value()[:13]
-
-    def _calc_stop(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(self._state).value()[13:]
-
-    def _reason(
-        self,
-        v_R: Sequence[float],
-        guide: Sequence[float],
-        robot: Sequence[float],
-        obstacle: Sequence[float],
-        target: Sequence[float],
-        view_cone: Sequence[float],
-        p: Vector,
-    ) -> int:
-        """Why the tool must stop, or MOVING."""
-        if target[12] >= NEVER_SEEN or obstacle[12] >= NEVER_SEEN:
-            return WAITING
-        if target[15] < 0.5:
-            return 1
-        if obstacle[15] < 0.5:
-            return 2
-        if not all(map(math.isfinite, (*v_R, *guide, *robot, *view_cone, *target[:3]))):
-            return 3
-        p_WG = (robot[0], robot[1], robot[2])
-        p_WS = (target[0], target[1], target[2])
-        if not reachable(self._params, p_WG, p_WS):
-            return 4
-        if cone_angle(view_cone, p_WS) > view_cone[6]:
-            return 5
-        if math.dist(p, robot[3:6]) > self._params.follow_error:
-            return 6
-        return MOVING
-
-    def _update(self, context: Any) -> Sequence[float]:
-        params = self._params
-        old = context.get_discrete_state(self._state).value().tolist()
-        v_R = self._v_R.Eval(context).tolist()
-        guide = self._guide.Eval(context).tolist()
-        robot = self._robot_tool.Eval(context).tolist()
-        view_cone = self._view_cone.Eval(context).tolist()
-        # The tip has moved on since the last instant.
-        step = context.get_time() - old[12]
-        p = (old[0] + old[6] * step, old[1] + old[7] * step, old[2] + old[8] * step)
-        v = (old[6], old[7], old[8])
-        stop = self._reason(
-            v_R,
-            guide,
-            robot,
-            self._obstacle.Eval(context).tolist(),
-            self._target.Eval(context).tolist(),
-            view_cone,
-            p,
+    def _next(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
+        told = self._permission.HasValue(context)
+        state = _update(
+            self._constants,
+            context.get_discrete_state(self._command).value(),
+            context.get_time(),
+            self._v_R.Eval(context),
+            self._guide.Eval(context),
+            self._robot_tool.Eval(context),
+            self._obstacle.Eval(context),
+            self._target.Eval(context),
+            self._view_cone.Eval(context),
+            self._permission.Eval(context) if told else _FREE,
         )
-        p_WG = (robot[0], robot[1], robot[2])
-        if not all(map(math.isfinite, p_WG)):
-            p_WG = (p[0] - old[3], p[1] - old[4], p[2] - old[5])
-        if stop == MOVING:
-            s = max(guide[7], params.min_proportion)
-            wanted = (v_R[0] / s, v_R[1] / s, v_R[2] / s)
-            wanted = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
-        else:
-            wanted = (0.0, 0.0, 0.0)
-        v = approach(v, wanted, params.acceleration * params.period)
-        u, q = unit(p[0] - p_WG[0], p[1] - p_WG[1], p[2] - p_WG[2])
-        along = v[0] * u[0] + v[1] * u[1] + v[2] * u[2]
-        du = [(v[i] - along * u[i]) / q for i in range(3)]
-        return [*p, *u, *v, *du, context.get_time(), stop]
+        return state[:13], state[13:]

@@ -5,17 +5,19 @@ finds "its trajectory thanks to the velocity and acceleration parameters", for t
 local planner. The paper gives no equations; here a Kalman filter over Singer's model.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.systems.framework import ValueProducer
 
 from systems.auto_guidance.optical_tracker import NEVER, MarkerBody
-from systems.auto_guidance.shaft_fulcrum import ShaftFulcrum
+from systems.auto_guidance.shaft_fulcrum import (
+    FIRST,
+    absorb_line,
+    initial_fulcrum,
+    shaft_constants,
+)
 from systems.auto_guidance.singer import (
     Covariance,
     correct_covariance,
@@ -23,6 +25,17 @@ from systems.auto_guidance.singer import (
     predict_covariance,
 )
 from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled, packed
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    dot,
+    norm,
+    sub,
+    unit,
+    xyz,
+)
 
 
 @dataclass
@@ -106,101 +119,121 @@ class TrajectoryEstimatorParams:
             )
 
 
-class TipFilter:
-    """The estimator's algorithm; all that changes is in the state vector.
+def constants(params: TrajectoryEstimatorParams) -> np.ndarray:
+    """The parameters as the compiled functions take them.
 
-    State (29): p, v, a (9), their covariance (6, see `singer`), the fulcrum's filter
-    (12, see `shaft_fulcrum`), time of the last good frame in s (1), and the variance
-    of the tip that comes from the fulcrum's own error (1).
+    Raises:
+        ValueError: If `params` make no sense.
     """
+    params.check()
+    return packed(
+        params,
+        alpha=1.0 / params.acceleration_time,
+        var_tremor=params.tremor_rms**2 / 3.0,
+        **shaft_constants(params.body, params.fulcrum),
+    )
 
-    def __init__(self, params: TrajectoryEstimatorParams) -> None:
-        params.check()
-        self._fulcrum = ShaftFulcrum(
-            params.body,
-            params.fulcrum,
-            (params.wall_height, params.sigma_wall),
-            (params.depth, params.sigma_depth),
-            params.fulcrum_drift,
-            params.gate,
-        )
-        self._alpha = 1.0 / params.acceleration_time
-        self._sigma_a = params.sigma_acceleration
-        self._sigma_v = params.sigma_velocity
-        self._var_tremor = params.tremor_rms**2 / 3.0
-        self._gate2 = params.gate**2
-        self._sigma_limit = params.sigma_limit
-        self._age_limit = params.age_limit
 
-    def initial(self) -> list[float]:
-        """The state before the first frame."""
-        return [0.0] * 15 + self._fulcrum.initial() + [NEVER, 0.0]
+def initial(params: TrajectoryEstimatorParams) -> np.ndarray:
+    """The state (29) before the first frame.
 
-    def absorb(self, x: list[float], m: Sequence[float]) -> list[float]:
-        """The state after a measurement; the same state if there is nothing new.
+    p, v, a (9), their covariance (6, see `singer`), the fulcrum's filter (12, see
+    `shaft_fulcrum`), time of the last good frame in s (1), and the variance of the
+    tip that comes from the fulcrum's own error (1).
+    """
+    return np.array([0.0] * 15 + initial_fulcrum(params.fulcrum) + [NEVER, 0.0])
 
-        Args:
-            x: State (29).
-            m: p_WP, u_W, frame time, valid (8); refused if it is old, invalid, not
-                finite, or too far from where the tip can be.
-        """
-        px, py, pz, ux, uy, uz, frame, valid = m
-        last = x[27]
-        if not valid >= 0.5 or not last < frame < math.inf:
+
+@compiled
+def _predict_covariance(params: Any, x: Numbers, dt: float) -> Covariance:
+    now = (x[9], x[10], x[11], x[12], x[13], x[14])
+    return predict_covariance(now, dt, params.alpha, params.sigma_acceleration)
+
+
+@compiled
+def _predict_mean(params: Any, x: Numbers, dt: float) -> tuple[Vector, Vector, Vector]:
+    kp, kv, ka = gains(dt, params.alpha)
+    p, v, a = xyz(x, 0), xyz(x, 3), xyz(x, 6)
+    return (
+        along(along(p, dt, v), kp, a),
+        along(v, kv, a),
+        (ka * a[0], ka * a[1], ka * a[2]),
+    )
+
+
+@compiled
+def absorb(params: Any, x: np.ndarray, m: Numbers) -> np.ndarray:
+    """The state after a measurement; the same state if there is nothing new.
+
+    Args:
+        params: A record of `constants`.
+        x: State (29), see `initial`.
+        m: p_WP, u_W, frame time, valid (8); refused if it is old, invalid, not
+            finite, or too far from where the tip can be.
+    """
+    last, frame, valid = x[27], m[6], m[7]
+    if not valid >= 0.5 or not last < frame < math.inf:
+        return x
+    measured = xyz(m, 0)
+    length = norm(xyz(m, 3))
+    if not 0.9 < length < 1.1 or not all_finite(measured):
+        return x
+    u = unit(xyz(m, 3))
+    dt = FIRST if last == NEVER else frame - last
+    if dt < 0.0 or dt > params.age_limit:
+        var_v = params.sigma_velocity * params.sigma_velocity
+        var_a = params.sigma_acceleration * params.sigma_acceleration
+        P = (1.0, 0.0, 0.0, var_v, 0.0, var_a)
+        rest = (0.0, 0.0, 0.0)
+        p, v, a = measured, rest, rest
+    else:
+        P = _predict_covariance(params, x, dt)
+        p, v, a = _predict_mean(params, x, dt)
+        miss = sub(measured, p)
+        variance = P[0] + params.var_tip + params.var_tremor + x[28]
+        if dot(miss, miss) > params.gate * params.gate * variance:
             return x
-        length = math.sqrt(ux * ux + uy * uy + uz * uz)
-        if not 0.9 < length < 1.1 or not math.isfinite(px + py + pz):
-            return x
-        u = ux / length, uy / length, uz / length
-        dt = None if last == NEVER else frame - last
-        if dt is None or dt > self._age_limit:
-            P: Covariance = (1.0, 0.0, 0.0, self._sigma_v**2, 0.0, self._sigma_a**2)
-            mx, my, mz, vx, vy, vz, ax, ay, az = (px, py, pz, *[0.0] * 6)
-        else:
-            P = self._predict_covariance(x, dt)
-            mx, my, mz, vx, vy, vz, ax, ay, az = self._predict_mean(x, dt)
-            miss = (px - mx) ** 2 + (py - my) ** 2 + (pz - mz) ** 2
-            variance = P[0] + self._fulcrum.var_tip + self._var_tremor + x[28]
-            if miss > self._gate2 * variance:
-                return x
-        lever = self._fulcrum.lever
-        c = px - lever * u[0], py - lever * u[1], pz - lever * u[2]
-        fulcrum, tip, variance, shared = self._fulcrum.absorb(x[15:27], c, u, dt)
-        P, (kp, kv, ka) = correct_covariance(P, variance + self._var_tremor)
-        ix, iy, iz = tip[0] - mx, tip[1] - my, tip[2] - mz
-        mean = (
-            *(mx + kp * ix, my + kp * iy, mz + kp * iz),
-            *(vx + kv * ix, vy + kv * iy, vz + kv * iz),
-            *(ax + ka * ix, ay + ka * iy, az + ka * iz),
-        )
-        return [*mean, *P, *fulcrum, frame, shared]
+    c = along(measured, -params.lever, u)
+    fulcrum, tip, variance, shared = absorb_line(params, x[15:27], c, u, dt)
+    P, (kp, kv, ka) = correct_covariance(P, variance + params.var_tremor)
+    innovation = sub(tip, p)
+    p = along(p, kp, innovation)
+    v = along(v, kv, innovation)
+    a = along(a, ka, innovation)
+    return np.array(p + v + a + P + fulcrum + (frame, shared))
 
-    def predict(self, x: list[float], t: float) -> list[float]:
-        """The estimate (17) at time `t` in s, see the port of `TrajectoryEstimator`."""
-        age = max(t - x[27], 0.0)
-        mean = self._predict_mean(x, min(age, self._age_limit))
-        if age > self._age_limit:
-            mean = (*mean[:3], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        sigmas = (1.0, 1.0, 1.0)
-        if x[27] != NEVER:
-            pp, _, _, vv, _, aa = self._predict_covariance(x, age)
-            pp += x[28] + self._var_tremor
-            sigmas = (math.sqrt(pp), math.sqrt(vv), math.sqrt(aa))
-        known = age <= self._age_limit and sigmas[0] <= self._sigma_limit
-        return [*mean, x[15], x[16], x[17], *sigmas, 1.0 if known else 0.0, age]
 
-    def _predict_covariance(self, x: list[float], dt: float) -> Covariance:
-        now = (x[9], x[10], x[11], x[12], x[13], x[14])
-        return predict_covariance(now, dt, self._alpha, self._sigma_a)
+@compiled
+def predict(params: Any, x: np.ndarray, t: float) -> np.ndarray:
+    """The estimate (17) at time `t` in s, see the port of `TrajectoryEstimator`.
 
-    def _predict_mean(self, x: list[float], dt: float) -> tuple[float, ...]:
-        kp, kv, ka = gains(dt, self._alpha)
-        px, py, pz, vx, vy, vz, ax, ay, az = x[:9]
-        return (
-            *(px + dt * vx + kp * ax, py + dt * vy + kp * ay, pz + dt * vz + kp * az),
-            *(vx + kv * ax, vy + kv * ay, vz + kv * az),
-            *(ka * ax, ka * ay, ka * az),
-        )
+    Args:
+        params: A record of `constants`.
+        x: State (29), see `initial`.
+        t: Time in s.
+    """
+    age = max(t - x[27], 0.0)
+    p, v, a = _predict_mean(params, x, min(age, params.age_limit))
+    if age > params.age_limit:
+        v = a = (0.0, 0.0, 0.0)
+    sigmas = (1.0, 1.0, 1.0)
+    if x[27] != NEVER:
+        pp, _, _, vv, _, aa = _predict_covariance(params, x, age)
+        pp += x[28] + params.var_tremor
+        sigmas = (math.sqrt(pp), math.sqrt(vv), math.sqrt(aa))
+    known = age <= params.age_limit and sigmas[0] <= params.sigma_limit
+    fulcrum = xyz(x, 15)
+    return np.array(p + v + a + fulcrum + sigmas + (1.0 if known else 0.0, age))
+
+
+@compiled
+def _absorb(record: np.ndarray, x: np.ndarray, m: np.ndarray) -> np.ndarray:
+    return absorb(record[0], x, m)
+
+
+@compiled
+def _estimate(record: np.ndarray, x: np.ndarray, m: np.ndarray, t: float) -> np.ndarray:
+    return predict(record[0], absorb(record[0], x, m), t)
 
 
 class TrajectoryEstimator(Block):
@@ -230,33 +263,24 @@ class TrajectoryEstimator(Block):
     def __init__(self, params: TrajectoryEstimatorParams | None = None) -> None:
         super().__init__()
         params = params or TrajectoryEstimatorParams()
-        self._filter = TipFilter(params)
+        self._constants = constants(params)
         self._measurement = self.vector_in(
             "measurement", [0.05, 0.0, -0.12, 0.0, 0.0, -1.0, 0.0, 1.0]
         )
-        self.DeclareDiscreteState(np.array(self._filter.initial()))
-        # The state with the present measurement in it: outputs and update share it.
-        self._absorbed: Any = self.DeclareCacheEntry(
-            "absorbed",
-            ValueProducer(allocate=lambda: Value(object()), calc=self._absorb),
-            {self.xd_ticket(), self._measurement.ticket()},
-        )
+        self.DeclareDiscreteState(initial(params))
         self.vector_out(
             "estimate",
             17,
             self._calc_estimate,
-            {self._absorbed.ticket(), self.time_ticket()},
+            {self.xd_ticket(), self._measurement.ticket(), self.time_ticket()},
         )
-        self.update_every(params.period, self._state_after)
+        self.update_every(params.period, self._update)
 
-    def _absorb(self, context: Any, value: Any) -> None:
-        state = context.get_discrete_state(0).value().tolist()
-        measurement = self._measurement.Eval(context).tolist()
-        value.set_value(self._filter.absorb(state, measurement))
+    def _update(self, context: Any) -> np.ndarray:
+        state = context.get_discrete_state(0).value()
+        return _absorb(self._constants, state, self._measurement.Eval(context))
 
-    def _state_after(self, context: Any) -> list[float]:
-        state: list[float] = self._absorbed.Eval(context)
-        return state
-
-    def _calc_estimate(self, context: Any) -> Sequence[float]:
-        return self._filter.predict(self._state_after(context), context.get_time())
+    def _calc_estimate(self, context: Any) -> np.ndarray:
+        state = context.get_discrete_state(0).value()
+        measurement = self._measurement.Eval(context)
+        return _estimate(self._constants, state, measurement, context.get_time())

@@ -14,11 +14,12 @@ An obstacle that stands has no crossing time: v_2 = 0, it is the potential
 field's task (the paper's static case).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import exp, isfinite, sqrt
+from math import exp, sqrt
 from typing import Any
+
+import numpy as np
 
 from systems.auto_guidance.signals import (
     GUIDE_EXAMPLE,
@@ -29,8 +30,19 @@ from systems.auto_guidance.signals import (
     velocity,
 )
 from systems.common.block import Block
-from systems.common.fuzzy import Partition, RuleTable
-from systems.common.geometry import Vector, along, cross, dot, norm, sub
+from systems.common.compiled import Numbers, compiled, packed
+from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    cross,
+    dot,
+    norm,
+    sub,
+    unit,
+    xyz,
+)
 
 DISTANCES = ["Z", "AZ", "M", "F", "VF"]
 TIMES = ["Z", "AZ", "M", "L", "VL"]
@@ -103,9 +115,8 @@ class VelocityCorrectionsParams:
                 raise ValueError(f"{name}={value} must be finite and > 0")
 
 
-def predicted_tip(
-    obstacle: Sequence[float], ahead: float, acceleration_time: float
-) -> Vector:
+@compiled
+def predicted_tip(obstacle: Numbers, ahead: float, acceleration_time: float) -> Vector:
     """O's tip `ahead` seconds from now, m.
 
     The acceleration is taken to die out (Singer's model): held constant over
@@ -114,15 +125,18 @@ def predicted_tip(
     tau = acceleration_time
     share = tau * tau * (ahead / tau - 1.0 + exp(-ahead / tau))
     return along(
-        along(obstacle[0:3], ahead, velocity(obstacle)), share, acceleration(obstacle)
+        along(xyz(obstacle, 0), ahead, velocity(obstacle)),
+        share,
+        acceleration(obstacle),
     )
 
 
+@compiled
 def crossing(
-    guide: Sequence[float],
-    v1: Sequence[float],
-    obstacle: Sequence[float],
-    params: VelocityCorrectionsParams,
+    guide: Numbers,
+    v1: Numbers,
+    obstacle: Numbers,
+    params: Any,
 ) -> tuple[float, float, float]:
     """Where and when O's shaft crosses the guide point's way.
 
@@ -130,20 +144,19 @@ def crossing(
         guide: The guide signal (12).
         v1: Velocity of the guide point, m/s.
         obstacle: Estimate (17) of O.
-        params: Horizon and tolerances.
+        params: A record of `constants`.
 
     Returns:
         (distance from M_R in m, time from now in s, degree in [0, 1] to which
         there is a crossing); degree 0 if there is none.
     """
     none = (0.0, 0.0, 0.0)
-    vx, vy, vz = v1
-    speed = sqrt(vx * vx + vy * vy + vz * vz)
+    speed = norm(v1)
     moving = 2.0 * norm(velocity(obstacle)) / params.moving_speed - 1.0
     if speed < 1e-9 or moving <= 0.0:
         return none
     g = fulcrum(obstacle)
-    a = sub(obstacle[0:3], g)
+    a = sub(xyz(obstacle, 0), g)
     b = sub(predicted_tip(obstacle, params.horizon, params.acceleration_time), g)
     n = cross(a, b)
     n2 = dot(n, n)
@@ -151,15 +164,15 @@ def crossing(
         return none
     # At the distance d on the way, over the plane of the sweep by h:
     # foot = alpha a + beta b, h = h0 + h1 d, alpha and beta likewise.
-    m = sub(guide[0:3], g)
-    e = (vx / speed, vy / speed, vz / speed)
+    m = sub(xyz(guide, 0), g)
+    e = unit(v1)
     size = sqrt(n2)
     h0, h1 = dot(m, n) / size, dot(e, n) / size
     b_n, n_a = cross(b, n), cross(n, a)
     alpha0, alpha1 = dot(m, b_n) / n2, dot(e, b_n) / n2
     beta0, beta1 = dot(m, n_a) / n2, dot(e, n_a) / n2
     near = params.near_distance
-    low, high = 0.0, norm(sub(guide[9:12], guide[0:3])) + near
+    low, high = 0.0, norm(sub(xyz(guide, 9), xyz(guide, 0))) + near
     for c0, c1 in (
         (near - h0, -h1),
         (near + h0, h1),
@@ -191,45 +204,52 @@ def crossing(
     return (low, time, degree) if degree > 0.0 else none
 
 
-class SpeedScale:
-    """Table II with its memberships: from a crossing to the share of v_1 kept."""
-
-    def __init__(self, params: VelocityCorrectionsParams) -> None:
-        self._distances = Partition(DISTANCES, params.distances)
-        self._times = Partition(TIMES, params.times)
-        scales = {s: [x] for s, x in zip(SPEEDS, params.scales, strict=True)}
-        self._table = RuleTable(TABLE_II, scales)
-
-    def __call__(self, distance: float, time: float) -> float:
-        """The share in [0, 1] for a crossing `distance` m and `time` s ahead."""
-        return self._table.infer(
-            self._times.degrees(time), self._distances.degrees(distance)
-        )[0]
+def constants(params: VelocityCorrectionsParams) -> np.ndarray:
+    """The parameters and Table II as the compiled functions take them."""
+    scales = {s: [x] for s, x in zip(SPEEDS, params.scales, strict=True)}
+    return packed(params, table=RuleTable(TABLE_II, scales).cells)
 
 
+@compiled
+def speed_scale(params: Any, distance: float, time: float) -> float:
+    """Table II: the share of v_1 kept, in [0, 1].
+
+    Args:
+        params: A record of `constants`.
+        distance: From M_R to the crossing, m.
+        time: Until O is there, s.
+    """
+    rows, columns = degrees(params.times, time), degrees(params.distances, distance)
+    weight = activations(params.table, len(params.scales), rows, columns)
+    return weighted_mean(weight, params.scales.reshape((-1, 1)))[0]
+
+
+@compiled
 def velocity_correction(
-    params: VelocityCorrectionsParams,
-    scale: SpeedScale,
-    v1: Sequence[float],
-    guide: Sequence[float],
-    obstacle: Sequence[float],
+    params: Any, v1: Numbers, guide: Numbers, obstacle: Numbers
 ) -> Vector:
     """v_2, m/s; zero where O is not known.
 
     Args:
-        params: Parameters.
-        scale: Table II.
+        params: A record of `constants`.
         v1: Velocity of the guide point, m/s.
         guide: The guide signal (12).
         obstacle: Estimate (17) of O.
     """
-    if not (usable(obstacle) and isfinite(sum(v1) + sum(guide))):
+    if not (usable(obstacle) and all_finite(v1) and all_finite(guide)):
         return 0.0, 0.0, 0.0
     distance, time, degree = crossing(guide, v1, obstacle, params)
     if degree <= 0.0:
         return 0.0, 0.0, 0.0
-    cut = -degree * (1.0 - scale(distance, time))
+    cut = -degree * (1.0 - speed_scale(params, distance, time))
     return cut * v1[0], cut * v1[1], cut * v1[2]
+
+
+@compiled
+def _v2(
+    record: np.ndarray, v1: np.ndarray, guide: np.ndarray, obstacle: np.ndarray
+) -> np.ndarray:
+    return np.array(velocity_correction(record[0], xyz(v1, 0), guide, obstacle))
 
 
 class VelocityCorrections(Block):
@@ -256,7 +276,7 @@ class VelocityCorrections(Block):
         super().__init__()
         self._params = params or VelocityCorrectionsParams()
         self._params.check()
-        self._scale = SpeedScale(self._params)
+        self._constants = constants(self._params)
         self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
         self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
         self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
@@ -271,11 +291,10 @@ class VelocityCorrections(Block):
             },
         )
 
-    def _calc_v2(self, context: Any) -> Vector:
-        return velocity_correction(
-            self._params,
-            self._scale,
-            self._v1.Eval(context).tolist(),
-            self._guide.Eval(context).tolist(),
-            self._obstacle.Eval(context).tolist(),
+    def _calc_v2(self, context: Any) -> np.ndarray:
+        return _v2(
+            self._constants,
+            self._v1.Eval(context),
+            self._guide.Eval(context),
+            self._obstacle.Eval(context),
         )

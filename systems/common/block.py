@@ -7,6 +7,7 @@ import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
+from systems.common.compiled import Numbers
 from systems.common.stopwatch import STOPWATCH
 
 
@@ -34,7 +35,7 @@ class Block(LeafSystem):
         self,
         name: str,
         size: int,
-        calc: Callable[[Any], Sequence[float]],
+        calc: Callable[[Any], Numbers],
         prerequisites: set[Any],
     ) -> Any:
         """Declares a vector output port computed by `calc(context)`.
@@ -42,16 +43,16 @@ class Block(LeafSystem):
         Args:
             name: The port's name.
             size: Number of elements.
-            calc: Returns the value for a context.
+            calc: Returns the value for a context; an array is taken over several
+                times faster than a list.
             prerequisites: Tickets of all that `calc` reads, so that the value
                 is cached and feedthrough is known.
         """
 
         def set_output(context: Any, output: Any) -> None:
-            with_time = STOPWATCH.begin()
-            # Drake takes an array several times faster than a list.
-            output.SetFromVector(np.asarray(calc(context)))
-            if with_time:
+            outermost = not STOPWATCH.running and STOPWATCH.begin()
+            output.SetFromVector(calc(context))
+            if outermost:
                 STOPWATCH.end(self.get_name(), context.get_time())
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
@@ -95,7 +96,7 @@ class Block(LeafSystem):
         return self.DeclareCacheEntry(name, producer, prerequisites)
 
     def update_every(
-        self, period: float, update: Callable[[Any], Sequence[Any]]
+        self, period: float, update: Callable[[Any], Numbers | Sequence[Any]]
     ) -> None:
         """Declares `update(context)` as the next value of the discrete state.
 
@@ -115,14 +116,14 @@ class Block(LeafSystem):
         groups = self.num_discrete_state_groups()
 
         def timed(context: Any, state: Any) -> None:
-            with_time = STOPWATCH.begin()
-            value = update(context)
+            outermost = not STOPWATCH.running and STOPWATCH.begin()
+            value: Any = update(context)
             if groups == 1:
-                state.set_value(np.asarray(value))
+                state.set_value(value)
             else:
                 for group, vector in enumerate(value):
-                    state.set_value(group, np.asarray(vector))
-            if with_time:
+                    state.set_value(group, vector)
+            if outermost:
                 STOPWATCH.end(self.get_name(), context.get_time(), True)
 
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, timed)

@@ -8,11 +8,13 @@ result is the mean of the conclusions weighted by their degrees. That is what
 a Mamdani inference gives for narrow output sets of equal width.
 """
 
-from bisect import bisect
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from math import cos, pi
-from operator import mul
+
+import numpy as np
+
+from systems.common.compiled import compiled
 
 type Membership = Callable[[float], float]
 
@@ -107,19 +109,7 @@ class Partition:
 
     def degrees(self, x: float) -> list[float]:
         """Membership of x in every label, in the labels' order."""
-        centers = self.centers
-        result = [0.0] * len(centers)
-        i = bisect(centers, x)
-        if i == 0:
-            result[0] = 1.0
-        elif i == len(centers):
-            result[-1] = 1.0
-        else:
-            low = centers[i - 1]
-            share = (x - low) / (centers[i] - low)
-            result[i - 1] = 1.0 - share
-            result[i] = share
-        return result
+        return degrees(np.array(self.centers, float), float(x)).tolist()
 
 
 class RuleTable:
@@ -127,6 +117,8 @@ class RuleTable:
 
     Attributes:
         conclusions: The conclusions' labels, in the order of `activations`.
+        cells: Index of each cell's conclusion (rows x columns).
+        values: The conclusions' vectors, one a row.
     """
 
     def __init__(
@@ -156,24 +148,16 @@ class RuleTable:
             raise ValueError(f"values of unequal length in {dict(values)}")
         self.conclusions = list(values)
         index = {label: i for i, label in enumerate(self.conclusions)}
-        self._cells = [[index[cell] for cell in row] for row in table]
-        # One list per component of the values, in the conclusions' order.
-        self._components = [list(c) for c in zip(*values.values(), strict=True)]
+        self.cells = np.array([[index[cell] for cell in row] for row in table])
+        self.values = np.array(list(values.values()), float)
 
     def activations(
         self, rows: Sequence[float], columns: Sequence[float]
     ) -> list[float]:
         """The degree of every conclusion, from the antecedents' degrees."""
-        result = [0.0] * len(self.conclusions)
-        active = [(j, degree) for j, degree in enumerate(columns) if degree > 0.0]
-        for i, row in enumerate(rows):
-            if row > 0.0:
-                cells = self._cells[i]
-                for j, column in active:
-                    degree = row if row < column else column
-                    if degree > result[cells[j]]:
-                        result[cells[j]] = degree
-        return result
+        row_array, column_array = np.array(rows, float), np.array(columns, float)
+        count = len(self.conclusions)
+        return activations(self.cells, count, row_array, column_array).tolist()
 
     def infer(self, rows: Sequence[float], columns: Sequence[float]) -> list[float]:
         """Mean of the conclusions' values, weighted by their degrees.
@@ -181,8 +165,57 @@ class RuleTable:
         Raises:
             ValueError: If no rule fires.
         """
-        degrees = self.activations(rows, columns)
-        total = sum(degrees)
-        if not total > 0.0:
-            raise ValueError("no rule fires: the memberships leave a gap")
-        return [sum(map(mul, degrees, c)) / total for c in self._components]
+        degree = self.activations(rows, columns)
+        return weighted_mean(np.array(degree), self.values).tolist()
+
+
+@compiled
+def degrees(centers: np.ndarray, x: float) -> np.ndarray:
+    """Membership of x in the triangles over increasing centers, see `Partition`."""
+    result = np.zeros(len(centers))
+    i = np.searchsorted(centers, x, side="right")
+    if i == 0:
+        result[0] = 1.0
+    elif i == len(centers):
+        result[-1] = 1.0
+    else:
+        share = (x - centers[i - 1]) / (centers[i] - centers[i - 1])
+        result[i - 1] = 1.0 - share
+        result[i] = share
+    return result
+
+
+@compiled
+def activations(
+    cells: np.ndarray, count: int, rows: np.ndarray, columns: np.ndarray
+) -> np.ndarray:
+    """The degree of each of `count` conclusions: maximum over rules of the minimum.
+
+    Args:
+        cells: Index of each rule's conclusion (rows x columns).
+        count: Number of conclusions.
+        rows: Degrees of the row variable.
+        columns: Degrees of the column variable.
+    """
+    result = np.zeros(count)
+    for i in range(len(rows)):
+        for j in range(len(columns)):
+            rule = cells[i, j]
+            result[rule] = max(result[rule], min(rows[i], columns[j]))
+    return result
+
+
+@compiled
+def weighted_mean(degree: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Mean of the rows of `values`, weighted by `degree`.
+
+    Raises:
+        ValueError: If all degrees are zero.
+    """
+    total = degree.sum()
+    if not total > 0.0:
+        raise ValueError("no rule fires: the memberships leave a gap")
+    result = np.zeros(values.shape[1])
+    for i in range(len(degree)):
+        result += degree[i] / total * values[i]
+    return result

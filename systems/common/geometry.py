@@ -1,12 +1,12 @@
-"""Points, segments and shafts in plain floats, for the control loop.
+"""Points, segments and shafts, compiled, for the control loop.
 
-A control step works on a handful of 3-vectors; there plain Python floats are
-several times faster than numpy. Vectors are sequences of three floats in one
-common frame and are returned as tuples. Lengths in meters.
+Vectors are tuples of three floats, or arrays, in one common frame, and are returned
+as tuples. Lengths in meters.
 """
 
-from collections.abc import Sequence
-from math import hypot, isfinite, sqrt
+from math import isfinite, sqrt
+
+from systems.common.compiled import Numbers, compiled
 
 type Vector = tuple[float, float, float]
 
@@ -15,18 +15,30 @@ type Vector = tuple[float, float, float]
 _PARALLEL = 1e-12
 
 
-def all_finite(*vectors: Sequence[float]) -> bool:
-    """True if no element of any vector is NaN or infinite."""
+@compiled
+def all_finite(values: Numbers) -> bool:
+    """True if no element is NaN or infinite."""
     # A sum with a NaN or an infinity in it is never finite.
-    return isfinite(sum(map(sum, vectors)))
+    total = 0.0
+    for value in values:
+        total += value
+    return isfinite(total)
 
 
-def dot(a: Sequence[float], b: Sequence[float]) -> float:
+@compiled
+def xyz(values: Numbers, start: int) -> Vector:
+    """The three elements of a signal from `start` on."""
+    return values[start], values[start + 1], values[start + 2]
+
+
+@compiled
+def dot(a: Numbers, b: Numbers) -> float:
     """The scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+@compiled
+def cross(a: Numbers, b: Numbers) -> Vector:
     """The vector product a x b."""
     return (
         a[1] * b[2] - a[2] * b[1],
@@ -35,37 +47,43 @@ def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
     )
 
 
-def sub(a: Sequence[float], b: Sequence[float]) -> Vector:
+@compiled
+def sub(a: Numbers, b: Numbers) -> Vector:
     """The difference a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def along(p: Sequence[float], t: float, d: Sequence[float]) -> Vector:
+@compiled
+def along(p: Numbers, t: float, d: Numbers) -> Vector:
     """The point p + t d."""
     return p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
 
 
-def norm(a: Sequence[float]) -> float:
+@compiled
+def norm(a: Numbers) -> float:
     """The Euclidean length."""
-    return hypot(a[0], a[1], a[2])
+    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
-def unit(a: Sequence[float], otherwise: Vector = (0.0, 0.0, 0.0)) -> Vector:
+@compiled
+def unit(a: Numbers, otherwise: Vector = (0.0, 0.0, 0.0)) -> Vector:
     """The direction of `a`, or `otherwise` where `a` has none (zero length)."""
-    length = hypot(a[0], a[1], a[2])
+    length = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     if length < 1e-12:
         return otherwise
     return a[0] / length, a[1] / length, a[2] / length
 
 
-def limited(a: Sequence[float], limit: float) -> Vector:
+@compiled
+def limited(a: Numbers, limit: float) -> Vector:
     """`a`, shortened to the length `limit` where it is longer."""
-    length = hypot(a[0], a[1], a[2])
+    length = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     scale = 1.0 if length <= limit else limit / length
     return a[0] * scale, a[1] * scale, a[2] * scale
 
 
-def any_perpendicular(a: Sequence[float]) -> Vector:
+@compiled
+def any_perpendicular(a: Numbers) -> Vector:
     """A unit vector perpendicular to `a`, always the same for the same `a`."""
     # Crossed with the axis that `a` is least aligned with.
     x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
@@ -78,9 +96,8 @@ def any_perpendicular(a: Sequence[float]) -> Vector:
     return unit(cross(a, axis), (1.0, 0.0, 0.0))
 
 
-def closest_on_segment(
-    p: Sequence[float], a: Sequence[float], b: Sequence[float]
-) -> tuple[float, float]:
+@compiled
+def closest_on_segment(p: Numbers, a: Numbers, b: Numbers) -> tuple[float, float]:
     """The point of segment a->b nearest to p.
 
     Returns:
@@ -94,8 +111,9 @@ def closest_on_segment(
     return t, norm(sub(along(a, t, d), p))
 
 
+@compiled
 def closest_points(
-    a0: Sequence[float], a1: Sequence[float], b0: Sequence[float], b1: Sequence[float]
+    a0: Numbers, a1: Numbers, b0: Numbers, b1: Numbers
 ) -> tuple[float, float, float, Vector, Vector]:
     """The closest points of the segments a0->a1 and b0->b1.
 
@@ -134,31 +152,55 @@ def closest_points(
             s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
     p = (a0[0] + s * ux, a0[1] + s * uy, a0[2] + s * uz)
     q = (b0[0] + t * vx, b0[1] + t * vy, b0[2] + t * vz)
-    return s, t, hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]), p, q
+    return s, t, norm(sub(p, q)), p, q
 
 
+@compiled
 def _closest_of_ends(
-    a0: Sequence[float], a1: Sequence[float], b0: Sequence[float], b1: Sequence[float]
+    a0: Numbers, a1: Numbers, b0: Numbers, b1: Numbers
 ) -> tuple[float, float]:
     """(s, t) for parallel or zero-length segments: an end is a closest point."""
     t1, d1 = closest_on_segment(a1, b0, b1)
     t0, d0 = closest_on_segment(a0, b0, b1)
     s1, e1 = closest_on_segment(b1, a0, a1)
     s0, e0 = closest_on_segment(b0, a0, a1)
-    least = min(d0, d1, e0, e1)
     # Ties differ by rounding only: far below any tool's radius.
-    tie = least + 1e-9
-    pairs = [(1.0, t1, d1), (s1, 1.0, e1), (s0, 0.0, e0), (0.0, t0, d0)]
-    s, t, _ = max((pair for pair in pairs if pair[2] <= tie), key=lambda pair: pair[0])
+    tie = min(d0, d1, e0, e1) + 1e-9
+    s, t = 1.0, t1
+    if d1 > tie:
+        s, t = -1.0, 0.0
+        if e1 <= tie and s1 > s:
+            s, t = s1, 1.0
+        if e0 <= tie and s0 > s:
+            s, t = s0, 0.0
+        if d0 <= tie and s < 0.0:
+            s, t = 0.0, t0
     return s, t
 
 
+@compiled
+def _over_face(
+    p: Numbers,
+    a: Numbers,
+    b: Numbers,
+    c: Numbers,
+    n: Numbers,
+) -> bool:
+    """True if p lies over or under the triangle abc of normal n."""
+    return (
+        dot(cross(sub(b, a), sub(p, a)), n) >= 0.0
+        and dot(cross(sub(c, b), sub(p, b)), n) >= 0.0
+        and dot(cross(sub(a, c), sub(p, c)), n) >= 0.0
+    )
+
+
+@compiled
 def segment_triangle_distance(
-    p0: Sequence[float],
-    p1: Sequence[float],
-    a: Sequence[float],
-    b: Sequence[float],
-    c: Sequence[float],
+    p0: Numbers,
+    p1: Numbers,
+    a: Numbers,
+    b: Numbers,
+    c: Numbers,
 ) -> float:
     """Distance of the segment p0->p1 from the triangle abc; 0 if it pierces it.
 
@@ -174,29 +216,21 @@ def segment_triangle_distance(
     )
     if area2 <= 1e-24:
         return least
-
-    def over_face(p: Sequence[float]) -> bool:
-        return (
-            dot(cross(sub(b, a), sub(p, a)), n) >= 0.0
-            and dot(cross(sub(c, b), sub(p, b)), n) >= 0.0
-            and dot(cross(sub(a, c), sub(p, c)), n) >= 0.0
-        )
-
     h0 = dot(sub(p0, a), n)
     h1 = dot(sub(p1, a), n)
     if h0 * h1 <= 0.0 and h0 != h1:
-        if over_face(along(p0, h0 / (h0 - h1), sub(p1, p0))):
+        if _over_face(along(p0, h0 / (h0 - h1), sub(p1, p0)), a, b, c, n):
             return 0.0
     else:
-        for p, h in ((p0, h0), (p1, h1)):
-            if over_face(p):
-                least = min(least, abs(h) / sqrt(area2))
+        if _over_face(p0, a, b, c, n):
+            least = min(least, abs(h0) / sqrt(area2))
+        if _over_face(p1, a, b, c, n):
+            least = min(least, abs(h1) / sqrt(area2))
     return least
 
 
-def shaft_point_velocity(
-    fraction: float, u: Sequence[float], v_tip: Sequence[float]
-) -> Vector:
+@compiled
+def shaft_point_velocity(fraction: float, u: Numbers, v_tip: Numbers) -> Vector:
     """Velocity of the shaft's material point at `fraction` of its inserted length.
 
     Insertion moves all of the shaft alike; turning about the fulcrum moves it

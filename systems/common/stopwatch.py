@@ -16,30 +16,32 @@ class Stopwatch:
     Attributes:
         rows: (block name, simulated time in s, wall time in s, whether it was an
             update), in call order.
+        running: Whether a call is being timed.
     """
 
     def __init__(self) -> None:
         self.rows: list[tuple[str, float, float, bool]] = []
-        self._start: float | None = None
+        self.running = False
+        self._start = 0.0
 
     def reset(self) -> None:
         """Forgets all rows."""
         self.rows = []
-        self._start = None
+        self.running = False
 
     def begin(self) -> bool:
         """Starts a call; False if it is inside another one."""
-        if self._start is not None:
+        if self.running:
             return False
+        self.running = True
         self._start = perf_counter()
         return True
 
     def end(self, name: str, time: float, is_update: bool = False) -> None:
         """Ends the outermost call of block `name` at simulated `time`."""
-        if self._start is not None:
-            wall = perf_counter() - self._start
-            self.rows.append((name, time, wall, is_update))
-            self._start = None
+        wall = perf_counter() - self._start
+        self.rows.append((name, time, wall, is_update))
+        self.running = False
 
     def whole_instants(self, controller: str) -> list[float]:
         """Wall time in s of all blocks at each instant `controller` updated in."""

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.inverse_kinematics import _tools
+from plants.snake.inverse_kernels import solve_tools
 from systems.common.compiled import compiled
 from systems.resection.snake_body import corners, drive_far
 from systems.resection.space import FREE, SOLID, first_forbidden, roll_back
@@ -44,7 +44,7 @@ def seed_random(seed: int) -> None:
 def tool_posture(b: Any, p: Any, n: Any, m: Any, x: Any) -> bool:
     """The posture with the tool at p, its axis n, intermediate axis m (1, 3 each)."""
     q, status = np.empty((1, 7)), np.empty(1, np.int64)
-    _tools(p, n, m, b.h, b.tool, b.bend, np.array([b.low, b.high]), q, status)
+    solve_tools(p, n, m, b.h, b.tool, b.bend, np.array([b.low, b.high]), q, status)
     if status[0] != 0:
         return False
     x[0] = q[0, 0]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from plants.snake.inverse_kinematics import REACHED, tool_postures
+from plants.snake.inverse_kinematics import REACHED, tool_posture
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
 
@@ -180,15 +180,13 @@ class ResectionIk(Block):
         """The motion one period later, and the status."""
         state = context.get_discrete_state(0).value().tolist()
         motion = Motion.of_vector(state)
-        target = self._target.Eval(context)
         try:
-            answer = tool_postures(target[:3], target[3:6], target[6:], self._snake)
+            q, status = tool_posture(self._target.Eval(context), self._snake)
         except ValueError:
             return motion.hold(), HOLD
-        status = int(answer.status)
         if status != REACHED:
             return motion.hold(), status
-        return motion.follow(universal(answer.q.tolist()), self._params), REACHED
+        return motion.follow(universal(q), self._params), REACHED
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
         return from_universal(self._next.Eval(context)[0].x)

@@ -32,8 +32,10 @@ class SnakeLocation(Block):
         self._snake = (snake or SnakeParams()).check()
         self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
         ticket = {self._state.ticket()}
-        self.vector_out("posture", 7, self._calc_posture, ticket)
-        self.vector_out("tool", 6, self._calc_tool, ticket)
+        self._posture = self.cached("posture", self._calc_posture, ticket)
+        known = {self._posture.ticket()}
+        self.vector_out("posture", 7, self._posture.Eval, known)
+        self.vector_out("tool", 6, self._calc_tool, known)
         self.vector_out("coupler_error", 1, self._calc_coupler_error, ticket)
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
@@ -43,7 +45,7 @@ class SnakeLocation(Block):
         return from_universal(near.tolist())
 
     def _calc_tool(self, context: Any) -> Sequence[float]:
-        X_WT = forward(self._calc_posture(context), self._snake)
+        X_WT = forward(self._posture.Eval(context), self._snake)
         return [*X_WT[:3, 3].tolist(), *X_WT[:3, 2].tolist()]
 
     def _calc_coupler_error(self, context: Any) -> Sequence[float]:

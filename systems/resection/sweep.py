@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.inverse_kinematics import _positioning
+from plants.snake.inverse_kernels import solve_positionings
 from systems.common.compiled import compiled
 from systems.resection.snake_body import OK, corners
 from systems.resection.space import roll_back
@@ -162,14 +162,15 @@ def intermediate(b: Any, x: Any, p: Any, n: Any) -> None:
 @compiled
 def posture_at(b: Any, p: Any, n: Any, x: Any) -> int:
     """The posture with O2 at p, axis n and a straight last module, into x (7,)."""
-    q = np.empty(5)
+    q, status = np.empty((1, 5)), np.empty(1, np.int64)
     travel = np.array([b.low, b.high])
-    status = _positioning(p, n, b.h, b.bend, travel, q)
-    if status != 0:
+    one, axis = p.reshape(1, 3), n.reshape(1, 3)
+    solve_positionings(one, axis, b.h, b.bend, travel, q, status)
+    if status[0] != 0:
         return LIMIT
-    x[0] = q[0]
+    x[0] = q[0, 0]
     for m in range(2):
-        alpha, beta = q[1 + 2 * m], q[2 + 2 * m]
+        alpha, beta = q[0, 1 + 2 * m], q[0, 2 + 2 * m]
         sb = math.sin(beta)
         x[1 + 2 * m] = math.atan2(-sb * math.sin(alpha), math.cos(beta))
         x[2 + 2 * m] = math.asin(sb * math.cos(alpha))

@@ -6,8 +6,13 @@ import importlib
 BENCHMARKS = {
     "speed": "tests.benchmarks.gauze_speed",
     "scenes": "tests.benchmarks.kinematic_scenes",
+    "bypass": "tests.benchmarks.bypass_suite",
+    "bypass-loop": "tests.benchmarks.bypass_full_loop",
     "snake": "tests.benchmarks.snake_speed",
     "resection": "tests.benchmarks.resection_speed",
+    "switching": "tests.benchmarks.switching_suite",
+    "wrist_step": "tests.benchmarks.wrist_step",
+    "wrist": "tests.benchmarks.wrist_sweep",
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 

@@ -112,6 +112,7 @@ class Scene:
         p_WPs: The target, m.
         p_WGo: The obstacle tool's fulcrum, m.
         legs: The motion of its tip; a single one of zero length if it stands.
+        others: Further tools that stand, tip and fulcrum of each, m.
     """
 
     p_WGr: Vector
@@ -119,6 +120,7 @@ class Scene:
     p_WPs: Vector
     p_WGo: Vector
     legs: list[Leg]
+    others: tuple[tuple[Vector, Vector], ...] = ()
 
     @property
     def rest_time(self) -> float:
@@ -156,10 +158,10 @@ def scene(kind: str, seed: int, number: int) -> Scene:
 def _draw(rng: np.random.Generator, moving: bool) -> Scene | None:
     """One try; None if it breaks a rule."""
     dome = rng.uniform(0.1, 0.12)
-    g_r, g_o = _fulcrum(rng, dome), _fulcrum(rng, dome)
+    g_r, g_o = draw_fulcrum(rng, dome), draw_fulcrum(rng, dome)
     if norm(sub(g_r, g_o)) < 0.06:
         return None
-    start, goal, tip = (_tip(rng, dome, g) for g in (g_r, g_r, g_o))
+    start, goal, tip = (draw_tip(rng, dome, g) for g in (g_r, g_r, g_o))
     if norm(sub(goal, start)) < 0.03:
         return None
     if segment_triangle_distance(g_o, tip, g_r, start, goal) >= CONTACT:
@@ -178,7 +180,7 @@ def _draw(rng: np.random.Generator, moving: bool) -> Scene | None:
     return Scene(g_r, start, goal, g_o, legs) if legs else None
 
 
-def _fulcrum(rng: np.random.Generator, dome: float) -> Vector:
+def draw_fulcrum(rng: np.random.Generator, dome: float) -> Vector:
     """A point on the dome, even over the cap of 65 degrees."""
     z = rng.uniform(cos(65.0 * pi / 180.0), 1.0)
     azimuth = rng.uniform(0.0, 2.0 * pi)
@@ -186,7 +188,7 @@ def _fulcrum(rng: np.random.Generator, dome: float) -> Vector:
     return dome * r * cos(azimuth), dome * r * sin(azimuth), dome * z
 
 
-def _tip(rng: np.random.Generator, dome: float, p_WG: Sequence[float]) -> Vector:
+def draw_tip(rng: np.random.Generator, dome: float, p_WG: Sequence[float]) -> Vector:
     """A point inside, even in volume, 80 to 160 mm from its fulcrum."""
     while True:
         x, y = rng.uniform(-dome, dome, 2)
@@ -214,7 +216,7 @@ def _wander(
     time = 0.0
     for _ in range(_TRIES):
         p0 = legs[-1].p1 if legs else tip
-        leg = Leg(time, p0, _tip(rng, dome, g_o), speed)
+        leg = Leg(time, p0, draw_tip(rng, dome, g_o), speed)
         last = leg.end >= _WANDER_TIME
         if last:
             leg = leg.shortened(_WANDER_TIME)

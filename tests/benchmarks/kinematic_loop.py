@@ -10,21 +10,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from systems.auto_guidance.backward_movement import (
-    BackwardMovementParams,
+import numpy as np
+
+from systems.auto_guidance import (
     backward_movement,
+    fuzzy_arbiter,
+    go_to_target,
+    velocity_corrections,
 )
-from systems.auto_guidance.fuzzy_arbiter import (
-    Decision,
-    FuzzyArbiterParams,
-    arbitrate,
-)
-from systems.auto_guidance.go_to_target import GoToTargetParams, go_to_target
-from systems.auto_guidance.velocity_corrections import (
-    SpeedScale,
-    VelocityCorrectionsParams,
-    velocity_correction,
-)
+from systems.auto_guidance.backward_movement import BackwardMovementParams
+from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
+from systems.auto_guidance.go_to_target import GoToTargetParams
+from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
 from systems.common.geometry import (
     Vector,
     along,
@@ -49,6 +46,7 @@ class Planner(Protocol):
         robot_tool: Sequence[float],
         obstacle: Sequence[float],
         target: Sequence[float],
+        others: Sequence[np.ndarray] = (),
     ) -> Vector:
         """The velocity of the robot's tip for the next `dt` seconds, m/s.
 
@@ -57,6 +55,7 @@ class Planner(Protocol):
             robot_tool: G_R, P_R (6), m.
             obstacle: Estimate (17) of O.
             target: Estimate (17) of S.
+            others: Estimates (17) of further tools.
         """
 
 
@@ -85,8 +84,10 @@ class LocalPlanner:
 
     def __post_init__(self) -> None:
         """Starts from rest."""
-        self._scale = SpeedScale(self.corrections)
-        self._decision = Decision(self.arbiter)
+        self._go = go_to_target.constants(self.go)[0]
+        self._corrections = velocity_corrections.constants(self.corrections)[0]
+        self._backward = backward_movement.constants(self.backward)[0]
+        self._arbiter = fuzzy_arbiter.constants(self.arbiter)[0]
         self._v1_tip: Vector = (0.0, 0.0, 0.0)
         self._v_tip: Vector = (0.0, 0.0, 0.0)
         self.v3: Vector = (0.0, 0.0, 0.0)
@@ -97,24 +98,28 @@ class LocalPlanner:
         robot_tool: Sequence[float],
         obstacle: Sequence[float],
         target: Sequence[float],
+        others: Sequence[np.ndarray] = (),
     ) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
-        self._v1_tip, self.guide = go_to_target(
-            self.go, self._v1_tip, dt, robot_tool, obstacle, target
+        robot_tool = np.asarray(robot_tool, float)
+        self._v1_tip, guide = self._go_to_target(
+            dt, robot_tool, obstacle, target, others
         )
+        self.guide = np.array(guide)
         zero = (0.0, 0.0, 0.0)
         s = self.guide[7]
         self.v1 = along(zero, s, self._v1_tip)
         if self.field_only:
             self.v2, self.v_R, self.weights = zero, self.v1, [1.0, 0.0, 0.0]
             return self._v1_tip
-        self.v2 = velocity_correction(
-            self.corrections, self._scale, self.v1, self.guide, obstacle
+        self.v2 = velocity_corrections.velocity_correction(
+            self._corrections, self.v1, self.guide, obstacle
         )
-        self.v3 = backward_movement(self.backward, self.v3, dt, self.guide, obstacle)
-        self.weights, self._v_tip, _ = arbitrate(
-            self.arbiter,
-            self._decision,
+        self.v3 = backward_movement.backward_movement(
+            self._backward, self.v3, dt, self.guide, obstacle
+        )
+        self.weights, self._v_tip, _ = fuzzy_arbiter.arbitrate(
+            self._arbiter,
             self._v_tip,
             dt,
             (self.v1, self.v2, self.v3),
@@ -126,15 +131,28 @@ class LocalPlanner:
         self.v_R = along(zero, s, self._v_tip)
         return self._v_tip
 
+    def _go_to_target(
+        self,
+        dt: float,
+        robot_tool: np.ndarray,
+        obstacle: Sequence[float],
+        target: Sequence[float],
+        others: Sequence[np.ndarray],
+    ) -> tuple[Vector, tuple[float, ...]]:
+        """v_1 / s and the guide signal; another form of the behaviour goes here."""
+        return go_to_target.go_to_target(
+            self._go, self._v1_tip, dt, robot_tool, obstacle, target
+        )
+
 
 def estimate(
     p: Sequence[float],
     fulcrum: Sequence[float],
     v: Sequence[float] = (0.0, 0.0, 0.0),
     a: Sequence[float] = (0.0, 0.0, 0.0),
-) -> list[float]:
+) -> np.ndarray:
     """An exact estimate (17) of a tool."""
-    return [*p, *v, *a, *fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0]
+    return np.array([*p, *v, *a, *fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -195,6 +213,7 @@ def run(
     robot: Robot | None = None,
     time_limit: float = 15.0,
     watch: Callable[[float, Vector], None] | None = None,
+    sense: Callable[[float, np.ndarray], np.ndarray] | None = None,
 ) -> Outcome:
     """Runs a scene to its end: contact, arrival with O at rest, or the limit.
 
@@ -206,22 +225,24 @@ def run(
         robot: The robot's limits.
         time_limit: In seconds.
         watch: Called at every planner step with the time and the tip.
+        sense: Makes of the time and O's exact estimate what the planner gets.
     """
     robot = robot or Robot()
     tip = scene.p_WPr
     clearance, fraction = float("inf"), 1.0
     arrival: float | None = None
     target = estimate(scene.p_WPs, scene.p_WPs)
+    others = [estimate(p, g) for p, g in scene.others]
     substeps = 4
     dt = PLANNER_PERIOD / substeps
     for k in range(round(time_limit / PLANNER_PERIOD)):
         time = k * PLANNER_PERIOD
         p, v, a = scene.obstacle_tip(time)
+        obstacle = estimate(p, scene.p_WGo, v, a)
+        if sense:
+            obstacle = sense(time, obstacle)
         v_tip = planner.step(
-            PLANNER_PERIOD,
-            [*scene.p_WGr, *tip],
-            estimate(p, scene.p_WGo, v, a),
-            target,
+            PLANNER_PERIOD, [*scene.p_WGr, *tip], obstacle, target, others
         )
         if watch:
             watch(time, tip)
@@ -231,6 +252,10 @@ def run(
             _, l_share, axes, _, _ = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
             if axes - CONTACT < clearance:
                 clearance, fraction = axes - CONTACT, l_share
+            for p, g in scene.others:
+                axes = closest_points(scene.p_WGr, tip, g, p)[2]
+                if axes - CONTACT < clearance:
+                    clearance, fraction = axes - CONTACT, 1.0
         if clearance <= 0.0:
             return Outcome(False, True, clearance, fraction, arrival)
         near = norm(sub(tip, scene.p_WPs)) < 1e-3

@@ -127,6 +127,11 @@ def table(scenes: int, seed: int, names: list[str]) -> str:
     return "\n".join(rows)
 
 
+def report(seed: int, scenes: int) -> str:
+    """The table of all planners, for `make bench`."""
+    return table(scenes, seed, list(PLANNERS))
+
+
 def main() -> None:
     """Prints the table."""
     parser = argparse.ArgumentParser(description=__doc__)

@@ -60,7 +60,7 @@ def test_a_leg_has_a_trapezoid_of_speed():
 class Straight:
     """A planner that goes straight at 50 mm/s and stops."""
 
-    def step(self, dt, robot_tool, obstacle, target):
+    def step(self, dt, robot_tool, obstacle, target, others=()):
         """See `Planner`."""
         d = sub(target[0:3], robot_tool[3:6])
         scale = min(0.05, 10.0 * norm(d)) / max(norm(d), 1e-9)
@@ -107,4 +107,4 @@ def test_the_table_has_a_row_for_every_set():
 
 def test_estimate_lays_out_the_signal():
     e = estimate((1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12))
-    assert len(e) == 17 and e[9:12] == [4, 5, 6] and e[15] == 1.0
+    assert len(e) == 17 and e[9:12].tolist() == [4, 5, 6] and e[15] == 1.0

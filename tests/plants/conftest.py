@@ -20,7 +20,7 @@ from plants.abdomen.abdomen import Abdomen, AbdomenParams, add_abdomen, seat_sle
 from plants.abdomen.scenery import add_scenery
 from plants.abdomen.wall_force import WallForce, add_wall_force
 from plants.arm.arm import SetPoint, add_arm
-from plants.arm.kinematics import payload_torque
+from plants.arm.controller_plant import make_controller_plant
 from plants.arm.parameters import BASE_POSITION
 from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
@@ -89,9 +89,12 @@ def joint_path(
     return CubicSpline(times, postures)
 
 
-def carrying(instrument: InstrumentParams, q: np.ndarray) -> list[float]:
-    """Torques that carry the instrument."""
-    return payload_torque(q.tolist(), instrument.mass, instrument.centre)
+def carrying(instrument: InstrumentParams, q: Any) -> np.ndarray:
+    """Joint torques in Nm (7) that carry the instrument's weight."""
+    plant = make_controller_plant(instrument=instrument)
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, np.array(q))
+    return -plant.CalcGravityGeneralizedForces(context)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ def all_blocks(package) -> list[type]:
 
 
 BLOCKS = all_blocks(systems)
-DIAGRAMS = ["gauze_static"]
+DIAGRAMS = ["gauze_static", "pwe_arc", "nav_one_static"]
 """One scenario of every kind of diagram."""
 # What observes a plant has no ports' values without it: tested in its diagram.
 OBSERVERS = all_blocks(plants)

@@ -125,14 +125,14 @@ def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     from diagrams.common.scenario import load_scenario
     from systems.auto_guidance.endoscope import Endoscope
 
-    follow = Endoscope._follow
+    follow = Endoscope._update
 
     def broken(self, context):
         if context.get_time() > 0.3:
             raise RuntimeError("the camera fell off")
         return follow(self, context)
 
-    monkeypatch.setattr(Endoscope, "_follow", broken)
+    monkeypatch.setattr(Endoscope, "_update", broken)
     scenario = load_scenario("gauze_static", duration=1.0)
     run = run_scenario(scenario, tmp_path, with_replay=False)
     assert "the camera fell off" in run.error

@@ -12,6 +12,7 @@ from plants.snake.inverse_kinematics import (
     TRAVEL_HIGH,
     TRAVEL_LOW,
     positioning,
+    tool_posture,
     tool_postures,
 )
 from plants.snake.kinematics import forward
@@ -113,6 +114,11 @@ def test_tool_poses():
     assert np.abs(back[:, :3, 3] - X[:, :3, 3]).max() <= 1e-9
     assert np.abs(back[:, :3, 2] - X[:, :3, 2]).max() <= 1e-12
     assert np.abs(answer.q[:, 6] - q[:, 6]).max() < 1e-9
+    for i in range(20):
+        target = np.concatenate([X[i, :3, 3], 2 * X[i, :3, 2], 3 * n_WI[i]])
+        q_one, status = tool_posture(target, PARAMS)
+        assert status == REACHED
+        np.testing.assert_allclose(q_one, answer.q[i], atol=1e-9)
     across = tool_postures([0, 0, 0.05], [0, 0, 1], [1, 0, -0.1], PARAMS)
     assert across.status == LAST_BEND
 

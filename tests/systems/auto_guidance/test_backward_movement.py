@@ -6,14 +6,16 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 import pytest
 
+from systems.auto_guidance import backward_movement as module
 from systems.auto_guidance.backward_movement import (
     BackwardMovement,
     BackwardMovementParams,
-    backward_movement,
-    contact_velocity,
 )
 from systems.auto_guidance.signals import GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
+from tests.loosely import loosely
 
+backward_movement = loosely(module.backward_movement, module.constants)
+contact_velocity = loosely(module.contact_velocity)
 DT = 1.0 / 60.0
 TIP_GUIDE = [*GUIDE_EXAMPLE[:8], 1.0, *GUIDE_EXAMPLE[9:]]
 

@@ -7,19 +7,15 @@ from pydrake.systems.analysis import Simulator
 import pytest
 import skfuzzy
 
+from systems.auto_guidance import fuzzy_arbiter as module
 from systems.auto_guidance.fuzzy_arbiter import (
     DECISIONS,
     DISTANCES,
     TABLE_I,
     WEIGHT_TABLE,
     WEIGHTS,
-    Decision,
     FuzzyArbiter,
     FuzzyArbiterParams,
-    arbitrate,
-    axes,
-    commanded_velocity,
-    quadrants,
 )
 from systems.auto_guidance.signals import (
     GUIDE_EXAMPLE,
@@ -27,9 +23,16 @@ from systems.auto_guidance.signals import (
     ROBOT_TOOL_EXAMPLE,
     TARGET_EXAMPLE,
 )
+from tests.loosely import loosely
 
+arbitrate = loosely(module.arbitrate, module.constants)
+axes = loosely(module.axes)
+commanded_velocity = loosely(module.commanded_velocity, module.constants)
+decision = loosely(module.decision, module.constants)
+decision_labels = loosely(module.decision_labels, module.constants)
+label_weights = loosely(module.label_weights, module.constants)
+quadrants = loosely(module.quadrants)
 PARAMS = FuzzyArbiterParams()
-DECISION = Decision(PARAMS)
 DT = 1.0 / 60.0
 
 # Table I as the paper prints it: v_R across, v_O down.
@@ -49,7 +52,7 @@ def direction(quadrant, speed=0.05):
 @pytest.mark.parametrize("row", range(4))
 @pytest.mark.parametrize("column", range(4))
 def test_each_cell_of_table_i(row, column):
-    degrees = DECISION.labels(direction(column + 1), direction(row + 1))
+    degrees = decision_labels(PARAMS, direction(column + 1), direction(row + 1))
     expected = [float(PAPER[row][column] == label) for label in DECISIONS]
     assert degrees == pytest.approx(expected)
 
@@ -73,7 +76,7 @@ def test_quadrants_sum_to_one_and_fade_without_speed():
         for k in range(4):
             off = cos(angle - pi / 4 - k * pi / 2)
             assert mu[k] == pytest.approx(max(0.0, off) ** 2)
-    assert quadrants(0.0, 0.0, 0.01) == [1.0] * 4
+    assert quadrants(0.0, 0.0, 0.01).tolist() == [1.0] * 4
     slow = quadrants(*direction(1, 0.004), 0.01)
     assert slow == pytest.approx([1.0, 0.6, 0.6, 0.6])
 
@@ -87,14 +90,16 @@ def test_labels_are_scikit_fuzzys_minimum_and_maximum():
         )
         cells = np.array(PAPER)
         expected = [fired[cells == label].max() for label in DECISIONS]
-        assert DECISION.labels(tuple(v_r), tuple(v_o)) == pytest.approx(expected)
+        assert decision_labels(PARAMS, tuple(v_r), tuple(v_o)) == pytest.approx(
+            expected
+        )
 
 
 @pytest.mark.parametrize("i", range(4))
 @pytest.mark.parametrize("j", range(3))
 def test_each_cell_of_the_weights(i, j):
     labels = [float(k == i) for k in range(4)]
-    got = DECISION.weights(labels, PARAMS.distances[j])
+    got = label_weights(PARAMS, labels, PARAMS.distances[j])
     assert got == pytest.approx(WEIGHTS[WEIGHT_TABLE[i][j]])
 
 
@@ -122,7 +127,7 @@ def test_weights_between_the_cells_are_scikit_fuzzys_inference():
             output = skfuzzy.trapmf(universe, (c - 5e-4, c - 5e-4, c + 5e-4, c + 5e-4))
             fired = np.fmax(fired, np.fmin(degree[cell], output))
         expected = 2.0 * skfuzzy.defuzz(universe, fired, "centroid")
-        _, c2, c3 = DECISION.weights(labels, distance)
+        _, c2, c3 = label_weights(PARAMS, labels, distance)
         assert c2 + c3 == pytest.approx(expected, abs=2e-3)
 
 
@@ -147,35 +152,39 @@ def meeting(v_o, rho=0.012):
 def test_opposed_velocities_bring_in_corrections_and_retreat():
     v1 = (0.03, 0.03, 0.0)  # to the goal, and to O
     guide, obstacle = meeting((0.0, -0.03, -0.0))
-    c1, c2, c3 = DECISION(v1, guide, obstacle)
+    c1, c2, c3 = decision(PARAMS, v1, guide, obstacle)
     assert c1 == 1.0 and c2 > 0.5 and c3 > 0.5
     guide, obstacle = meeting((0.0, -0.03, 0.0), rho=0.03)
-    c1, c2, c3 = DECISION(v1, guide, obstacle)
+    c1, c2, c3 = decision(PARAMS, v1, guide, obstacle)
     assert c2 > 0.5 and c3 < 0.1  # near, not close
     guide, obstacle = meeting((0.0, -0.03, 0.0), rho=0.06)
-    assert DECISION(v1, guide, obstacle) == [1.0, 0.0, 0.0]
+    assert decision(PARAMS, v1, guide, obstacle) == (1.0, 0.0, 0.0)
 
 
 def test_same_direction_is_left_to_the_field():
     guide, obstacle = meeting((0.02, -0.03, 0.0))
-    assert DECISION((0.02, -0.03, 0.0), guide, obstacle) == pytest.approx([1, 0, 0])
+    assert decision(PARAMS, (0.02, -0.03, 0.0), guide, obstacle) == pytest.approx(
+        [1, 0, 0]
+    )
 
 
 def test_the_gated_table_tells_parting_from_closing():
-    literal = Decision(FuzzyArbiterParams(table="literal"))
+    literal = FuzzyArbiterParams(table="literal")
     v1, v_o = (0.02, 0.03, 0.0), (0.0, -0.03, 0.0)
     closing = meeting(v_o)
     parting = meeting((0.0, 0.03, 0.0))
     back = (0.02, -0.03, 0.0)
-    assert DECISION(v1, *closing) == pytest.approx(literal(v1, *closing))
-    assert literal(back, *parting)[2] > 0.3
-    assert DECISION(back, *parting) == [1.0, 0.0, 0.0]
+    assert decision(PARAMS, v1, *closing) == pytest.approx(
+        decision(literal, v1, *closing)
+    )
+    assert decision(literal, back, *parting)[2] > 0.3
+    assert decision(PARAMS, back, *parting) == (1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.004])
 def test_a_standing_or_trembling_obstacle_is_left_to_the_field(speed):
     guide, obstacle = meeting((0.0, -speed, 0.0))
-    assert DECISION((0.02, 0.03, 0.0), guide, obstacle) == [1.0, 0.0, 0.0]
+    assert decision(PARAMS, (0.02, 0.03, 0.0), guide, obstacle) == (1.0, 0.0, 0.0)
 
 
 def test_equation_6():
@@ -219,7 +228,6 @@ def test_comes_to_rest_smoothly_when_something_is_not_known(lost):
     for _ in range(8):
         weights, v, s = arbitrate(
             PARAMS,
-            DECISION,
             v,
             DT,
             (v1, zero, zero),
@@ -229,7 +237,7 @@ def test_comes_to_rest_smoothly_when_something_is_not_known(lost):
             target,
         )
         speeds.append(np.linalg.norm(v))
-        assert weights == [0.0, 0.0, 0.0] and np.isfinite(s)
+        assert weights == (0.0, 0.0, 0.0) and np.isfinite(s)
     start = np.hypot(0.05, 0.02)
     expected = [max(0.0, start - (k + 1) * DT) for k in range(8)]
     np.testing.assert_allclose(speeds, expected, atol=1e-12)
@@ -255,7 +263,6 @@ def test_block_output_is_the_step_that_its_update_makes():
     context = fixed(dut)
     weights, v_tip, s = arbitrate(
         PARAMS,
-        DECISION,
         (0.0, 0.0, 0.0),
         DT,
         ((0.05, 0, 0), (-0.01, 0, 0), (0, -0.01, 0)),

@@ -12,12 +12,16 @@ import pytest
 from plants.arm.arm import SetPoint
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
+from systems.auto_guidance import joint_commands
 from systems.auto_guidance.joint_commands import (
     JointCommands,
     JointCommandsParams,
+    free_velocity,
     joint_velocity,
-    tool_twist,
 )
+from tests.loosely import loosely
+
+tool_twist = loosely(joint_commands.tool_twist)
 
 PLANT = make_controller_plant()
 TIP = PLANT.GetFrameByName(INSTRUMENT_TIP)
@@ -54,6 +58,34 @@ def test_velocities_agree_with_drakes_own_inverse_kinematics():
         np.testing.assert_allclose(J @ ours, V, atol=1e-4)
 
 
+def random_problem(seed):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(6, 7)), rng.normal(size=6), rng.normal(size=7)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_free_minimum_is_the_quadratic_programs_without_bounds(seed):
+    J, V, v_nominal = random_problem(seed)
+    wide = np.full(7, 1e3)
+    expected = joint_velocity(J, V, v_nominal, -wide, wide)
+    v = free_velocity(J, V, v_nominal)
+    np.testing.assert_allclose(v, expected, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(J @ v, V, atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounded_minimum_cannot_be_improved(seed):
+    J, V, v_nominal = random_problem(seed)
+    limit = 0.5 * abs(free_velocity(J, V, v_nominal)).max()
+    high = np.full(7, limit)
+    v = joint_velocity(J, V, v_nominal, -high, high)
+    assert abs(v).max() == pytest.approx(limit)
+    gradient = J.T @ (J @ v - V) + 1e-6 * (v - v_nominal)
+    inside = abs(v) < limit - 1e-9
+    np.testing.assert_allclose(gradient[inside], 0.0, atol=1e-6)
+    assert (gradient[~inside] * v[~inside] <= 1e-9).all()
+
+
 def test_bounds_hold_and_lead_back():
     _, _, _, J = kinematics(READY_POSTURE)
     low, high = -np.full(7, 0.1), np.full(7, 0.1)
@@ -69,7 +101,8 @@ def test_twist_keeps_the_roll():
     u /= np.linalg.norm(u)
     du = np.cross([0.3, 0.1, 0.2], u)
     tool = [0.0, 0.0, -0.1, *u, 0.01, 0.0, 0.0, *du, 1.0]
-    twist = np.array(tool_twist([0.0, 0.0, -0.1], u.tolist(), tool, 1.0, PERIOD, 0.3))
+    w, v = tool_twist([0.0, 0.0, -0.1], u, tool, 1.0, PERIOD, 0.3)
+    twist = np.array([*w, *v])
     assert twist[:3] @ u == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(np.cross(twist[:3], u), du, atol=1e-12)
     np.testing.assert_allclose(twist[3:], [0.01, 0.0, 0.0])
@@ -126,6 +159,20 @@ def test_too_fast_a_command_is_reported_and_bounded():
     step = np.diff([posture for posture, _, _ in rows], axis=0) / PERIOD
     assert (np.abs(step) <= speed + 1e-6).all()
     assert rows[-1][2][0] == 1.0
+
+
+def test_quadprog_is_asked_only_where_bounds_are_met(monkeypatch):
+    asked = []
+
+    def watched(*args):
+        asked.append(args)
+        return joint_velocity(*args)
+
+    monkeypatch.setattr(joint_commands, "joint_velocity", watched)
+    follow(circle, 0.1)
+    assert not asked
+    follow(circle, 0.1, JointCommandsParams(joint_speed=0.01))
+    assert asked
 
 
 def test_a_command_that_is_no_number_holds_the_arm():

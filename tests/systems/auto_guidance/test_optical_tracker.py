@@ -70,13 +70,13 @@ def test_noise_is_that_of_a_fitted_marker_body():
     u = np.array([0.3, -0.2, -math.sqrt(1 - 0.13)])
     tip = np.array([0.02, 0.01, -0.12])
     rng = np.random.default_rng(0)
-    shaft = [*tip.tolist(), *u.tolist()]
+    shaft = np.concatenate([tip, u])
     n = 6000
     ours = np.array(
         [
             disturb(
                 shaft,
-                rng.standard_normal(6).tolist(),
+                rng.standard_normal(6),
                 body.lever,
                 body.sigma_position(),
                 body.sigma_direction(),

@@ -7,9 +7,15 @@ import pytest
 
 from systems.auto_guidance.optical_tracker import MarkerBody, disturb
 from systems.auto_guidance.shaft_fulcrum import (
-    ShaftFulcrum,
+    FIRST,
+    absorb_line,
+    initial_fulcrum,
     lateral_variance,
     measure,
+)
+from systems.auto_guidance.trajectory_estimator import (
+    TrajectoryEstimatorParams,
+    constants,
 )
 
 BODY = MarkerBody()
@@ -17,7 +23,10 @@ G = np.array([0.02, 0.09, 0.004])
 
 
 def dut(given=None, drift=1e-4, sigma_wall=0.01):
-    return ShaftFulcrum(BODY, given, (0.0, sigma_wall), (0.12, 0.06), drift, 5.0)
+    params = TrajectoryEstimatorParams(
+        body=BODY, fulcrum=given, fulcrum_drift=drift, sigma_wall=sigma_wall
+    )
+    return constants(params)[0]
 
 
 def frames(tips, seed, fulcrum=G):
@@ -26,8 +35,8 @@ def frames(tips, seed, fulcrum=G):
     for tip in tips:
         u = (tip - fulcrum) / np.linalg.norm(tip - fulcrum)
         m = disturb(
-            [*tip.tolist(), *u.tolist()],
-            rng.standard_normal(6).tolist(),
+            np.concatenate([tip, u]),
+            rng.standard_normal(6),
             BODY.lever,
             BODY.sigma_position(),
             BODY.sigma_direction(),
@@ -42,11 +51,15 @@ def moving(n):
 
 
 def track(fulcrum, tips, seed, true=G, state=None):
-    state = fulcrum.initial() if state is None else state
+    if state is None:
+        given = fulcrum["fulcrum"].tolist() if fulcrum["given"] else None
+        state = np.array(initial_fulcrum(given))
     errors, spreads = [], []
     for k, (c, u, tip) in enumerate(frames(tips, seed, true)):
-        dt = None if k == 0 and state[11] == -1.0 and not any(state[3:9]) else 1 / 60
-        state, fused, variance, shared = fulcrum.absorb(state, c, u, dt)
+        first = k == 0 and state[11] == -1.0 and not any(state[3:9])
+        dt = FIRST if first else 1 / 60
+        state, fused, variance, shared = absorb_line(fulcrum, state, c, u, dt)
+        state = np.array(state)
         errors.append(np.array(fused) - tip)
         spreads.append(variance + shared)
     return state, np.array(errors), np.array(spreads)
@@ -126,11 +139,11 @@ def test_another_fulcrum_is_noticed():
     state, errors, _ = track(fulcrum, tips, seed=7, true=other, state=state)
     np.testing.assert_allclose(state[:3], other, atol=5e-4)
     # Meanwhile the tip is never worse than the tracker itself finds it (4 sigma).
-    assert np.abs(errors).max() < 4.0 * math.sqrt(fulcrum.var_tip)
+    assert np.abs(errors).max() < 4.0 * math.sqrt(fulcrum["var_tip"])
 
 
 def test_given_fulcrum_stays():
     fulcrum = dut(given=G.tolist())
     state, errors, _ = track(fulcrum, moving(60), seed=8)
-    assert state[:3] == G.tolist()
+    np.testing.assert_array_equal(state[:3], G)
     assert np.sqrt((errors**2).sum(axis=1).mean()) < 0.25e-3

@@ -10,6 +10,7 @@ from systems.auto_guidance.tool_navigation import (
     MOVING,
     ToolNavigation,
     ToolNavigationParams,
+    constants,
     limit_tip_velocity,
     reachable,
 )
@@ -141,8 +142,9 @@ def test_an_arm_that_does_not_follow_stops_the_tool():
 
 
 def test_limits_leave_free_motion_alone():
-    params = ToolNavigationParams()
-    v = limit_tip_velocity(params, P_WG, (0, 0, -0.1), (0.05, 0, 0), WIDE_CONE)
+    params = constants(ToolNavigationParams())[0]
+    tip = (0.0, 0.0, -0.1)
+    v = limit_tip_velocity(params, P_WG, tip, (0.05, 0.0, 0.0), np.array(WIDE_CONE))
     assert v == pytest.approx((0.05, 0.0, 0.0))
     assert reachable(params, P_WG, (0.0, 0.0, -0.1))
     assert not reachable(params, P_WG, (0.0, 0.0, -0.01))

@@ -6,23 +6,25 @@ import numpy as np
 import pytest
 import skfuzzy
 
+from systems.auto_guidance import velocity_corrections as module
 from systems.auto_guidance.signals import OBSTACLE_EXAMPLE
 from systems.auto_guidance.velocity_corrections import (
     DISTANCES,
     SPEEDS,
     TABLE_II,
     TIMES,
-    SpeedScale,
     VelocityCorrections,
     VelocityCorrectionsParams,
-    crossing,
-    predicted_tip,
-    velocity_correction,
 )
-from systems.common.geometry import closest_on_segment
+from systems.common import geometry
+from tests.loosely import loosely
 
+closest_on_segment = loosely(geometry.closest_on_segment)
+crossing = loosely(module.crossing, module.constants)
+predicted_tip = loosely(module.predicted_tip)
+speed_scale = loosely(module.speed_scale, module.constants)
+velocity_correction = loosely(module.velocity_correction, module.constants)
 PARAMS = VelocityCorrectionsParams()
-SCALE = SpeedScale(PARAMS)
 
 # Table II as the paper prints it: distance across, time down.
 PAPER = """
@@ -55,7 +57,9 @@ def test_labels_are_the_papers():
 def test_each_cell_gives_its_speed(i, j):
     scales = dict(zip(SPEEDS, PARAMS.scales, strict=True))
     expected = scales[ROWS[i][1 + j]]
-    assert SCALE(PARAMS.distances[j], PARAMS.times[i]) == pytest.approx(expected)
+    assert speed_scale(PARAMS, PARAMS.distances[j], PARAMS.times[i]) == pytest.approx(
+        expected
+    )
 
 
 def test_stop_and_max_movement_are_the_papers():
@@ -87,7 +91,7 @@ def test_between_the_cells_it_is_scikit_fuzzys_inference():
                 output = skfuzzy.trapmf(universe, corners)
                 fired = np.fmax(fired, np.fmin(min(row, column), output))
         expected = skfuzzy.defuzz(universe, fired, "centroid")
-        assert SCALE(distance, time) == pytest.approx(expected, abs=1e-3)
+        assert speed_scale(PARAMS, distance, time) == pytest.approx(expected, abs=1e-3)
 
 
 def test_crossing_against_brute_force():
@@ -128,8 +132,8 @@ def test_correction_keeps_the_tables_share_of_v1():
     g = guide(m_r, (0.05, 0.0, -0.1))
     distance, time, degree = crossing(g, v1, o, PARAMS)
     assert degree > 0.8 and 0.02 < distance < 0.04 and 0.5 < time < 0.9
-    v2 = velocity_correction(PARAMS, SCALE, v1, g, o)
-    cut = degree * (1 - SCALE(distance, time))
+    v2 = velocity_correction(PARAMS, v1, g, o)
+    cut = degree * (1 - speed_scale(PARAMS, distance, time))
     assert cut > 0.2
     np.testing.assert_allclose(v2, [-cut * 0.05, 0, 0])
 
@@ -149,7 +153,7 @@ def test_no_steps_where_a_crossing_comes_into_being():
     g, v1 = guide((-0.05, 0.0, -0.1), (0.05, 0.0, -0.1)), (0.05, 0.0, 0.0)
     cuts = [
         velocity_correction(
-            PARAMS, SCALE, v1, g, obstacle((0.01, y, -0.12), (-0.05, 0.0, 0.01))
+            PARAMS, v1, g, obstacle((0.01, y, -0.12), (-0.05, 0.0, 0.01))
         )[0]
         for y in np.linspace(0.06, -0.03, 361)
     ]
@@ -179,7 +183,7 @@ def test_acceleration_dies_out_in_the_prediction():
     ],
 )
 def test_nothing_known_nothing_corrected(v1, g, o):
-    assert velocity_correction(PARAMS, SCALE, v1, g, o) == (0.0, 0.0, 0.0)
+    assert velocity_correction(PARAMS, v1, g, o) == (0.0, 0.0, 0.0)
 
 
 def test_block():
@@ -189,7 +193,7 @@ def test_block():
     o = obstacle((0.01, -0.03, -0.12), (-0.05, 0.0, 0.01))
     for name, value in (("v1", (0.05, 0, 0)), ("guide", g), ("obstacle", o)):
         dut.GetInputPort(name).FixValue(context, value)
-    expected = velocity_correction(PARAMS, SCALE, (0.05, 0, 0), g, o)
+    expected = velocity_correction(PARAMS, (0.05, 0, 0), g, o)
     np.testing.assert_allclose(dut.GetOutputPort("v2").Eval(context), expected)
     assert expected[0] < 0.0
 

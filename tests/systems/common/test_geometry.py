@@ -7,18 +7,19 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from systems.common.geometry import (
-    all_finite,
-    any_perpendicular,
-    closest_on_segment,
-    closest_points,
-    dot,
-    limited,
-    norm,
-    segment_triangle_distance,
-    shaft_point_velocity,
-    unit,
-)
+from systems.common import geometry
+from systems.common.geometry import all_finite
+from tests.loosely import loosely
+
+any_perpendicular = loosely(geometry.any_perpendicular)
+closest_on_segment = loosely(geometry.closest_on_segment)
+closest_points = loosely(geometry.closest_points)
+dot = loosely(geometry.dot)
+limited = loosely(geometry.limited)
+norm = loosely(geometry.norm)
+segment_triangle_distance = loosely(geometry.segment_triangle_distance)
+shaft_point_velocity = loosely(geometry.shaft_point_velocity)
+unit = loosely(geometry.unit)
 
 # A grid of millimeters makes parallel, crossing and degenerate cases frequent.
 points = st.tuples(*[st.integers(-4, 4).map(lambda k: 0.01 * k)] * 3)
@@ -135,8 +136,8 @@ def test_shaft_point_velocity_is_that_of_a_rigid_shaft_through_its_fulcrum():
 
 
 def test_small_helpers():
-    assert all_finite([1.0, 2.0], [3.0]) and not all_finite([1.0, nan])
-    assert not all_finite([float("inf"), -float("inf")])
+    assert all_finite(np.array([1.0, 2.0])) and not all_finite((1.0, 2.0, nan))
+    assert not all_finite((float("inf"), -float("inf"), 0.0))
     assert unit((0, 0, 0)) == (0, 0, 0)
     assert limited((3, 4, 0), 1.0) == pytest.approx((0.6, 0.8, 0.0))
     assert limited((3, 4, 0), 6.0) == (3, 4, 0)

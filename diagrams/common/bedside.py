@@ -1,0 +1,106 @@
+"""The robot at the bedside: arm, instrument and abdomen in one continuous plant."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.tree import ForceElementIndex, LinearBushingRollPitchYaw
+
+from plants.abdomen.abdomen import Abdomen, add_abdomen, seat_sleeve
+from plants.abdomen.scenery import add_scenery
+from plants.abdomen.wall_force import add_wall_force
+from plants.abdomen.wall_motion import WallMotionParams, add_wall_motion
+from plants.arm.arm import add_arm
+from plants.arm.parameters import BASE_POSITION
+from plants.arm.posture import home_posture
+from plants.common.actuation import hold_still
+from plants.common.scene import add_plant_and_scene, connect_poses
+from plants.instruments.instrument import Instrument, add_instrument
+
+
+@dataclass
+class Bedside:
+    """What `add_bedside` added.
+
+    Attributes:
+        systems: By the names that wires use.
+        posture: Joint positions at the start (7) [rad].
+        instrument: The robot's instrument.
+        abdomen: The abdomen.
+    """
+
+    systems: dict[str, Any]
+    posture: np.ndarray
+    instrument: Instrument
+    abdomen: Abdomen
+
+
+def add_bedside(builder: Any, scenario: Any) -> Bedside:
+    """Adds arm, instrument and abdomen to a diagram.
+
+    The plant starts at rest, the shaft through the true fulcrum and unloaded.
+
+    Args:
+        builder: The diagram's builder.
+        scenario: Has `robot`, `arm`, `instrument`, `abdomen`, `wall_motion` and
+            `duration`.
+
+    Raises:
+        ValueError: If the start cannot be reached.
+    """
+    motion: WallMotionParams = scenario.wall_motion
+    plant, scene_graph = add_plant_and_scene(builder)
+    arm = add_arm(plant, params=scenario.arm)
+    instrument = add_instrument(
+        plant, plant.GetFrameByName("flange", arm), scenario.instrument
+    )
+    abdomen = add_abdomen(
+        plant, instrument.body.body_frame(), scenario.robot.p_WG, scenario.abdomen
+    )
+    add_scenery(plant, BASE_POSITION)
+    plant.Finalize()
+    connect_poses(builder, plant, scene_graph)
+    moved = motion.displacement(0.0)
+    p_WG = np.add(scenario.robot.p_WG, moved)
+    posture = home_posture(
+        plant, arm, instrument.tip, p_WG.tolist(), scenario.robot.p_WP
+    )
+    plant.SetDefaultPositions(arm, posture)
+    plant.SetDefaultPositions(abdomen.wall_instance, moved)
+    context = plant.CreateDefaultContext()
+    seat_sleeve(plant, context, abdomen)
+    plant.SetDefaultPositions(plant.GetPositions(context))
+    hold_still(builder, plant, abdomen.sleeve_instance)
+    add_wall_motion(builder, plant, abdomen, motion, scenario.duration)
+    systems = {
+        "plant": plant,
+        "scene_graph": scene_graph,
+        "wall_force": add_wall_force(builder, plant, abdomen, motion.stiffness_factor),
+    }
+    return Bedside(systems, posture, instrument, abdomen)
+
+
+def stiffen(scenario: Any, station: Any, context: Any) -> None:
+    """Sets the trocar's stiffness for the present time: insufflation stretches it.
+
+    The spring's constants are parameters of the plant, which no block may change,
+    so this is done between two advances.
+
+    Args:
+        scenario: Has `abdomen` and `wall_motion`.
+        station: The study's diagram.
+        context: The root diagram's context.
+    """
+    motion = scenario.wall_motion
+    if motion.stiffening == 0.0:
+        return
+    plant = station.GetSubsystemByName("plant")
+    for index in range(plant.num_force_elements()):
+        element = plant.get_force_element(ForceElementIndex(index))
+        if isinstance(element, LinearBushingRollPitchYaw):
+            stiffness = scenario.abdomen.stiffness * motion.stiffness_factor(
+                context.get_time()
+            )
+            element.SetForceStiffnessConstants(
+                plant.GetMyMutableContextFromRoot(context), [stiffness] * 3
+            )

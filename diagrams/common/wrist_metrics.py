@@ -1,0 +1,90 @@
+"""The figures of the passive wrist, all from true quantities."""
+
+from typing import Any
+
+import numpy as np
+
+CONVERGED = 1e-3
+"""The fulcrum is found when the estimate is this close to stay [m]."""
+CHI2_95 = 7.815
+"""95 % point of the normalised squared error of a 3-D estimate."""
+
+
+def settled(time: np.ndarray, value: np.ndarray, bound: float) -> float | None:
+    """How long after the first sample a value stays within a bound; None if never."""
+    over = np.flatnonzero(value > bound)
+    if not len(over):
+        return 0.0
+    last = int(over[-1])
+    if last + 1 >= len(time):
+        return None
+    return float(time[last + 1] - time[0])
+
+
+def estimate_errors(run: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Estimate minus true fulcrum: 3-D, across the shaft, and normalised squared."""
+    error = run.matrix("wrist.fulcrum")[:, :3] - run.matrix("wall.fulcrum")[:, :3]
+    u = run.matrix("wrist.shaft")[:, 3:6]
+    along = np.einsum("ni,ni->n", error, u)
+    across = error - along[:, None] * u
+    C = run.matrix("wrist.covariance").reshape(-1, 3, 3) + 1e-14 * np.eye(3)
+    squared = np.einsum("ni,ni->n", error, np.linalg.solve(C, error[..., None])[..., 0])
+    return np.linalg.norm(error, axis=1), np.linalg.norm(across, axis=1), squared
+
+
+def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]:
+    """The wrist's share of `metrics.json`.
+
+    Args:
+        run: A run whose log holds `WRIST_SIGNALS`.
+        start: Figures start here [s].
+        event: Time of the wall's jump [s]; negative for none.
+    """
+    time = run.signals["time"]
+    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+    off = run.signals["wall.fulcrum_error"]
+    spatial, across, squared = estimate_errors(run)
+    late = time >= start - 1e-9
+    wrist = run.scenario.passive_wrist
+    scale = run.signals["wrist.permission.speed_scale"]
+    code = np.round(run.signals["wrist.permission.code"])
+    figures: dict[str, Any] = {
+        "wrist": run.scenario.wrist,
+        "rms_lateral_force": rms(force[late]),
+        "max_lateral_force": float(force[late].max(initial=0.0)),
+        "max_lateral_force_ever": float(force.max()),
+        "time_over_warning": float(np.mean(force > wrist.warning_force) * time[-1]),
+        "time_over_limit": float(np.mean(force > wrist.force_limit) * time[-1]),
+        "rms_fulcrum_error": rms(off[late]),
+        "max_fulcrum_error": float(off[late].max(initial=0.0)),
+        "rms_estimate_error": rms(spatial[late]),
+        "rms_lateral_estimate_error": rms(across[late]),
+        "fulcrum_convergence_time": settled(time[late], spatial[late], CONVERGED),
+        "lateral_convergence_time": settled(time[late], across[late], CONVERGED),
+        "fulcrum_error_3s": float(np.interp(start + 3.0, time, spatial)),
+        "nees_above_95": float(np.mean(squared[time > 15.0] > CHI2_95))
+        if time[-1] > 16.0
+        else None,
+        "stiffness_estimate": float(run.signals["wrist.fulcrum.stiffness"][-1]),
+        "breathing_rate_estimate": float(run.signals["wrist.fulcrum.rate"][-1]),
+        "jumps_followed": int(run.signals["wrist.fulcrum.jumps"][-1]),
+        "estimates_refused": int(run.signals["wrist.fulcrum.refused"][-1]),
+        "time_frozen": float(np.mean((code == 8) | (code == 9)) * time[-1]),
+        "mean_speed_scale": float(scale[late].mean()) if late.any() else None,
+    }
+    if event >= 0.0:
+        after = time >= event
+        clock, load = time[after] - event, force[after]
+        figures["time_to_2N"] = last_above(clock, load, 2.0)
+        figures["time_to_02N"] = last_above(clock, load, 0.2)
+    return figures
+
+
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def last_above(time: np.ndarray, value: np.ndarray, bound: float) -> float | None:
+    """When a value falls below a bound to stay; None if it never does."""
+    return settled(np.append(0.0, time), np.append(bound, value), bound)

@@ -1,0 +1,95 @@
+"""Plots of the bypass: the clearance over time, and several forms side by side."""
+
+from typing import Any
+
+from matplotlib.figure import Figure
+import numpy as np
+
+from diagrams.common.plots import COLORS, add_axes, new_figure
+
+MM = 1e3
+
+
+def clearance(run: Any) -> Figure:
+    """Clearances to all tools over time, and what the constraint and the bypass do."""
+    figure = new_figure(7.0, 5.2)
+    time = run.signals["time"]
+    upper = add_axes(figure, 2, 1, 1)
+    gaps = run.matrix("clearance") * MM
+    for column, who, name in (
+        (0, "obstacle", "O"),
+        (1, "target", "S (touched at the hand-over)"),
+        (2, "camera", "endoscope"),
+    ):
+        upper.plot(time, gaps[:, column], color=COLORS[who], label=name)
+    upper.axhline(0.0, color="k", lw=0.8)
+    upper.set(ylabel="clearance [mm]", ylim=(-6.0, 40.0), xlim=(time[0], time[-1]))
+    upper.legend(ncols=3, loc="upper right")
+    lower = add_axes(figure, 2, 1, 2, sharex=upper)
+    status = run.matrix("planner.clearance")
+    lower.plot(time, status[:, 4] * MM, color=COLORS["robot"], label="changed by")
+    marks = [("dodging", status[:, 3] > 0.5, COLORS["accent"])]
+    marks.append(
+        (
+            "evasion condition fails",
+            (status[:, 1] > 0.5) & (status[:, 2] < 0.5),
+            COLORS["obstacle"],
+        )
+    )
+    if "planner.way.waiting" in run.signals:
+        way = run.matrix("planner.way")
+        marks.append(("waiting", way[:, 1] > 0.5, COLORS["muted"]))
+    top = max(10.0, 1.05 * float(status[:, 4].max()) * MM)
+    for name, flags, color in marks:
+        lower.fill_between(
+            time, 0.0, top, where=flags, color=color, alpha=0.3, lw=0, label=name
+        )
+    lower.set(xlabel="time [s]", ylabel="tip velocity [mm/s]", ylim=(0.0, top))
+    lower.legend(ncols=2, loc="upper right")
+    return figure
+
+
+def forms(runs: dict[str, Any]) -> Figure:
+    """The same scene under several forms of the planner: ways, and distance left.
+
+    Args:
+        runs: Runs of one scenario, by what to call them.
+    """
+    figure = new_figure(9.0, 4.4)
+    axes = add_axes(figure, 1, 2, 1, projection="3d")
+    beside = add_axes(figure, 1, 2, 2)
+    colors = [COLORS["robot"], COLORS["accent"], COLORS["muted"], COLORS["camera"]]
+    first = next(iter(runs.values()))
+    ends = []
+    for who, label in (("obstacle", "O"), ("target", "S")):
+        fulcrum = np.array(getattr(first.scenario, who).p_WG) * MM
+        tip = first.matrix(f"{who}.shaft")[-1, :3] * MM
+        axes.plot(*np.column_stack([fulcrum, tip]), color=COLORS[who], lw=4)
+        axes.text(*tip, f"  {label}", color=COLORS[who])
+        ends += [fulcrum, tip]
+    for (name, run), color in zip(runs.items(), colors, strict=False):
+        tool = run.matrix("robot.tool") * MM
+        axes.plot(*tool[:, 3:].T, color=color, lw=2.2, label=name)
+        axes.plot(*tool[-1:, 3:].T, "o", color=color, ms=6)
+        axes.plot(*np.stack([tool[-1, :3], tool[-1, 3:]]).T, color=color, lw=1, ls=":")
+        left = np.linalg.norm(
+            tool[:, 3:] - run.matrix("target.shaft")[:, :3] * MM, axis=1
+        )
+        beside.plot(run.signals["time"], left, color=color, label=name)
+        ends += [tool[0, :3], *tool[::10, 3:]]
+    points = np.array(ends)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = (low + high) / 2.0, (high - low).max() / 2.0
+    axes.set(
+        xlim=(middle[0] - half, middle[0] + half),
+        ylim=(middle[1] - half, middle[1] + half),
+        zlim=(middle[2] - half, middle[2] + half),
+        title="fulcrums, shafts and ways of the tip [mm]",
+    )
+    axes.set_box_aspect((1, 1, 1))
+    axes.view_init(elev=24, azim=-62)
+    beside.set(
+        xlabel="time [s]", ylabel="distance from the target [mm]", ylim=(0, None)
+    )
+    beside.legend(loc="upper right")
+    return figure

@@ -1,0 +1,161 @@
+"""Plots of a navigation: the ways of the planners, and what happened when."""
+
+from dataclasses import replace
+from typing import Any
+
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+import numpy as np
+
+from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.navigation.figures import thesis_figures, total_potential
+from diagrams.navigation.metrics import gaps, goal_distance
+from systems.switching.statechart_planner import STATES
+from systems.switching.switching_state import MODES
+
+PLANNER_COLORS = {
+    "switching": COLORS["robot"],
+    "classical": COLORS["accent"],
+    "statechart": COLORS["target"],
+}
+
+
+def state_names(planner: str) -> tuple[str, ...]:
+    """Names of a planner's states, by number."""
+    return {"switching": MODES, "statechart": STATES}.get(planner, ("sum of fields",))
+
+
+def companions(run: Any) -> dict[str, Any]:
+    """The run and those of the planners to compare with, by planner."""
+    from diagrams.common.run import simulate
+
+    runs = {run.scenario.planner: run}
+    for name in run.scenario.compare:
+        if name not in runs:
+            runs[name] = simulate(replace(run.scenario, planner=name, compare=[]))
+    return runs
+
+
+def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
+    """Draws obstacles, fainter where they were earlier, start and goal.
+
+    Time ends a little after the goal is reached.
+    """
+    rows = run.matrix("obstacles.rows")
+    arrival = run.metrics["time_to_target"]
+    if arrival is not None:
+        rows = rows[run.signals["time"] <= arrival + 1.0]
+    rows = rows.reshape(len(rows), -1, 5)
+    for k in range(rows.shape[1]):
+        if rows[0, k, 2] <= 0.0 or abs(rows[0, k, 0]) > 500.0:
+            continue
+        track = rows[:, k, :2]
+        moves = np.ptp(track, axis=0).max() > 1e-6
+        count = moments if moves else 1
+        for share in np.linspace(0.0, 1.0, count):
+            x, y = track[int(share * (len(track) - 1))]
+            alpha = 0.75 if not moves else 0.12 + 0.5 * share
+            disc = Circle((x, y), rows[0, k, 2], color=COLORS["obstacle"], lw=0)
+            disc.set_alpha(alpha)
+            axes.add_patch(disc)
+        if moves:
+            axes.plot(*track.T, ":", color=COLORS["obstacle"], lw=0.8)
+    axes.plot(*run.scenario.start, "o", color="k", ms=5)
+    axes.plot(*run.scenario.goal, "*", color=COLORS["target"], ms=13, zorder=5)
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
+
+
+def outcome(run: Any) -> str:
+    """What became of a run, in a few words."""
+    figures = run.metrics
+    if figures["collided"]:
+        return "collides"
+    if figures["reached"]:
+        return f"arrives after {figures['time_to_target']:.1f} s"
+    return "does not arrive"
+
+
+def draw_ways(axes: Any, runs: dict[str, Any]) -> None:
+    """Draws the planners' ways, each until its run was decided."""
+    for name, run in runs.items():
+        robot = run.matrix("robot.state")
+        hit = np.flatnonzero(gaps(run).min(axis=1) <= 0.0)
+        robot = robot[: hit[0] + 1] if hit.size else robot
+        label = f"{name}: {outcome(run)}"
+        axes.plot(*robot[:, :2].T, color=PLANNER_COLORS[name], lw=1.8, label=label)
+        if not run.metrics["reached"]:
+            end = "X" if hit.size else "s"
+            axes.plot(*robot[-1, :2], end, color=PLANNER_COLORS[name], ms=7)
+
+
+def path(run: Any, runs: dict[str, Any]) -> Figure:
+    """The ways of all compared planners in one picture."""
+    figure = new_figure(7.5, 5.5)
+    axes = add_axes(figure, 1, 1, 1)
+    draw_world(axes, run)
+    draw_ways(axes, runs)
+    robot = run.matrix("robot.state")
+    radius = run.scenario.robot.radius
+    for share in np.linspace(0.0, 1.0, 6):
+        x, y = robot[int(share * (len(robot) - 1)), :2]
+        axes.add_patch(Circle((x, y), radius, fill=False, color=COLORS["robot"]))
+    axes.autoscale_view()
+    figure.legend(loc="outside lower center", ncols=1)
+    axes.set_title(run.scenario.description)
+    return figure
+
+
+def motion(run: Any) -> Figure:
+    """Clearance, distance to the goal, speed and state over time."""
+    figure = new_figure(7.5, 6.5)
+    time = run.signals["time"]
+    robot = run.matrix("robot.state")
+    upper = add_axes(figure, 3, 1, 1)
+    gap = gaps(run).min(axis=1)
+    upper.plot(time, gap, color=COLORS["obstacle"], label="nearest obstacle")
+    upper.plot(time, goal_distance(run), color=COLORS["target"], label="goal")
+    upper.axhline(0.0, color="k", lw=0.8)
+    upper.set(ylabel="distance [m]", xlim=(0.0, time[-1]))
+    upper.legend(loc="upper right")
+    middle = add_axes(figure, 3, 1, 2, sharex=upper)
+    middle.plot(time, robot[:, 3], color=COLORS["robot"], label="speed [m/s]")
+    middle.plot(time, robot[:, 4], color=COLORS["accent"], label="turn rate [rad/s]")
+    middle.legend(loc="upper right")
+    lower = add_axes(figure, 3, 1, 3, sharex=upper)
+    names = state_names(run.scenario.planner)
+    mode = np.round(run.matrix("planner.mode")[:, 0])
+    lower.step(time, mode, where="post", color=COLORS["robot"])
+    lower.set(xlabel="time [s]", yticks=range(len(names)), yticklabels=names)
+    lower.set_ylim(-0.5, len(names) - 0.5)
+    return figure
+
+
+def potential(run: Any, runs: dict[str, Any]) -> Figure:
+    """The classical total potential of the world, and the ways (Figures 7, 8)."""
+    s = run.scenario
+    world = [
+        (float(k), *o.start, o.radius, 0.0, 0.0) for k, o in enumerate(s.obstacles)
+    ]
+    middle = 0.5 * (np.array(s.start) + s.goal)
+    half = np.maximum(np.abs(middle - s.start) + 1.0, 3.5)
+    low, high = middle - half, middle + half
+    figure = new_figure(7.5, 6.0)
+    axes = add_axes(figure, 1, 1, 1)
+    params = replace(s.classical, body_radius=s.robot.radius, speed=s.robot.speed)
+    total_potential(axes, params, world, s.goal, low, high)
+    draw_world(axes, run)
+    draw_ways(axes, runs)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_title("Total potential of the classical method, and the ways")
+    figure.legend(loc="outside lower center")
+    return figure
+
+
+def plots(run: Any) -> dict[str, Figure]:
+    """All plots of a run, by file name."""
+    runs = companions(run)
+    figures = {"path": path(run, runs), "motion": motion(run)}
+    if run.scenario.thesis_figures:
+        figures["potential"] = potential(run, runs)
+        figures |= thesis_figures()
+    return figures

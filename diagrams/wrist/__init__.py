@@ -1,0 +1,1 @@
+"""The passive wrist alone: a scripted task, the wrist, the arm, the wall."""

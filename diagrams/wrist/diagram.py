@@ -1,0 +1,73 @@
+"""The diagram of a wrist study: Figure 2 with a scripted task as its planner."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.common.bedside import add_bedside
+from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
+from diagrams.wrist.scenario import WristScenario
+from systems.auto_guidance.joint_commands import JointCommands
+from systems.auto_guidance.robot_location import RobotLocation
+from systems.passive_wrist.arc_navigation import ArcNavigation
+
+WIRES = (
+    *WRIST_WIRES,
+    # The task plans its arcs about the fulcrum that the wrist turns about.
+    ("passive_wrist.pivot", "arc_navigation.fulcrum"),
+    ("passive_wrist.permission", "arc_navigation.permission"),
+    ("arc_navigation.tool", "passive_wrist.tool_wanted"),
+    ("joint_commands.set_point", "plant.pa10_desired_state"),
+    ("plant.pa10_state", "robot_location.arm_state"),
+    ("passive_wrist.pivot", "robot_location.fulcrum"),
+)
+
+EXPORTS = WRIST_EXPORTS | {
+    "robot.tool": "robot_location.robot_tool",
+    "navigation.tool": "arc_navigation.tool",
+    "joints.status": "joint_commands.status",
+    "wall.force": "wall_force.force",
+    "wall.fulcrum_error": "wall_force.fulcrum_error",
+    "scene_graph.query": "scene_graph.query",
+}
+
+
+def make_wrist_diagram(
+    scenario: WristScenario, swaps: Mapping[str, Any] | None = None
+) -> Any:
+    """Makes the diagram.
+
+    Args:
+        scenario: The parameters.
+        swaps: Systems that replace blocks of the same name and ports.
+
+    Raises:
+        ValueError: If a parameter makes no sense, or a swap has no place.
+    """
+    builder = DiagramBuilder()
+    bedside = add_bedside(builder, scenario)
+    robot = scenario.robot
+    guess = [p + e for p, e in zip(robot.p_WG, scenario.first_guess, strict=True)]
+    blocks = swap(
+        {
+            "arc_navigation": ArcNavigation(scenario.arcs, robot.p_WP, guess),
+            "joint_commands": JointCommands(
+                scenario.joints,
+                bedside.posture.tolist(),
+                scenario.arm,
+                scenario.instrument,
+            ),
+            "robot_location": RobotLocation(scenario.instrument),
+        },
+        swaps,
+    )
+    for name, block in blocks.items():
+        builder.AddNamedSystem(name, block)
+    systems = bedside.systems | add_wrist(builder, bedside, scenario) | blocks
+    connect(builder, systems, WIRES)
+    export(builder, systems, EXPORTS)
+    diagram = builder.Build()
+    diagram.set_name("passive_wrist")
+    return diagram

@@ -1,0 +1,42 @@
+"""The passive wrist as a study: what is logged, measured, plotted and shown."""
+
+from typing import Any
+
+from diagrams.common.bedside import stiffen
+from diagrams.common.study import Study, View
+from diagrams.common.wrist import WRIST_SIGNALS
+from diagrams.common.wrist_metrics import wrist_figures
+from diagrams.common.wrist_replay import decorate_wrist
+from diagrams.wrist.diagram import make_wrist_diagram
+from diagrams.wrist.plots import plots
+from diagrams.wrist.scenario import WristScenario, check
+
+XYZ = ("x", "y", "z")
+SIGNALS: dict[str, tuple[str, ...]] = WRIST_SIGNALS | {
+    "robot.tool": (*(f"fulcrum_{axis}" for axis in XYZ), "tip_x", "tip_y", "tip_z"),
+    "joints.status": ("code",),
+    "wall.force": XYZ,
+    "wall.fulcrum_error": ("distance",),
+}
+
+
+def measure(run: Any) -> dict[str, Any]:
+    """The figures of a run."""
+    return wrist_figures(run, run.scenario.measure_from, run.scenario.event)
+
+
+STUDY = Study(
+    name="wrist",
+    scenario=WristScenario,
+    make_diagram=make_wrist_diagram,
+    check=check,
+    measure=measure,
+    signals=SIGNALS,
+    log_period=1.0 / 120.0,
+    plots=plots,
+    decorate=decorate_wrist,
+    controller="passive_wrist",
+    adjust=stiffen,
+    required=("system", "duration", "wrist", "robot.p_WG", "robot.p_WP"),
+    view=View(camera=(0.3, -0.42, 0.14), target=(0.0, 0.0, 0.0)),
+)

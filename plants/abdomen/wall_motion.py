@@ -1,0 +1,164 @@
+"""How the wall moves: breathing, a sudden step, and insufflation.
+
+The wall's body is placed by stiff servos; what they are told is a trajectory of
+Drake's own, so no Python runs inside the integrator's step. Respiration at 0.2 Hz
+with I:E 1:1.5 is usual under a ventilator; how far a trocar moves with it was not
+found: sweep 2 to 10 mm.
+"""
+
+from dataclasses import dataclass, field
+from math import cos, exp, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+from pydrake.systems.primitives import TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
+
+from plants.abdomen.abdomen import Abdomen
+from plants.common.actuation import hold_still
+
+_INSPIRATION = 0.4  # share of a breath, I:E 1:1.5
+_EXPIRATION = 0.05  # time constant of the passive expiration, share of a breath
+_KNOT = 1.0 / 30.0  # [s]
+
+
+@dataclass
+class WallMotionParams:
+    """Motion of the wall at the fulcrum; vectors in W, all zero is a still wall.
+
+    Attributes:
+        breathing: Amplitude in m: the wall moves by plus and minus this.
+        rate: Of the breathing, in Hz.
+        wave: `sine`, or `ventilator` (smooth in, sharp out).
+        phase: Of the breathing at the start, in breaths.
+        step: Sudden displacement, in m.
+        step_time: When, in s.
+        rise: Slow displacement of an insufflation, in m.
+        rise_time: When it begins, in s.
+        rise_duration: In s.
+        stiffening: Relative growth of the trocar's stiffness with it.
+    """
+
+    breathing: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    rate: float = 0.2
+    wave: str = "sine"
+    phase: float = 0.0
+    step: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    step_time: float = 0.0
+    rise: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    rise_time: float = 0.0
+    rise_duration: float = 5.0
+    stiffening: float = 0.0
+
+    def check(self) -> None:
+        """Raises ValueError for a value that makes no sense."""
+        for name in ("breathing", "step", "rise"):
+            vector = getattr(self, name)
+            if len(vector) != 3 or not all(abs(x) <= 0.05 for x in vector):
+                raise ValueError(
+                    f"wall_motion.{name}={vector}: expected 3 numbers of at most 0.05 m"
+                )
+        if not 0.05 <= self.rate <= 1.0:
+            raise ValueError(
+                f"wall_motion.rate={self.rate} Hz: expected in [0.05, 1]; "
+                "0.15 to 0.35 is usual"
+            )
+        if self.wave not in ("sine", "ventilator"):
+            raise ValueError(
+                f"wall_motion.wave={self.wave!r}: expected 'sine' or 'ventilator'"
+            )
+        if not self.rise_duration > 0.0:
+            raise ValueError(
+                f"wall_motion.rise_duration={self.rise_duration} s: expected > 0"
+            )
+        if not -0.9 <= self.stiffening <= 10.0:
+            raise ValueError(
+                f"wall_motion.stiffening={self.stiffening}: expected in [-0.9, 10]"
+            )
+
+    @property
+    def still(self) -> bool:
+        """Whether the wall never moves."""
+        return not any((*self.breathing, *self.step, *self.rise))
+
+    def displacement(self, time: float) -> list[float]:
+        """Where the wall is told to be, from its rest, in m (3)."""
+        g = wave(self.wave, self.rate * time + self.phase)
+        jump = 1.0 if any(self.step) and time >= self.step_time else 0.0
+        r = self.risen(time)
+        return [
+            b * g + s * jump + up * r
+            for b, s, up in zip(self.breathing, self.step, self.rise, strict=True)
+        ]
+
+    def risen(self, time: float) -> float:
+        """Share of the insufflation that is done, smooth from 0 to 1."""
+        share = min(max((time - self.rise_time) / self.rise_duration, 0.0), 1.0)
+        return share * share * (3.0 - 2.0 * share)
+
+    def stiffness_factor(self, time: float) -> float:
+        """Trocar's stiffness against that of `AbdomenParams`."""
+        return 1.0 + self.stiffening * self.risen(time)
+
+
+def wave(kind: str, breaths: float) -> float:
+    """The breathing wave in [-1, 1] at a phase in breaths; the sine starts at zero."""
+    if kind == "sine":
+        return sin(2.0 * pi * breaths)
+    phase = breaths % 1.0
+    if phase < _INSPIRATION:
+        return -cos(pi * phase / _INSPIRATION)
+    out = (phase - _INSPIRATION) / _EXPIRATION
+    rest = (1.0 - _INSPIRATION) / _EXPIRATION
+    left = (1.0 + rest) * exp(-rest)  # what is not yet out at the breath's end
+    return 2.0 * ((1.0 + out) * exp(-out) - left * out / rest) - 1.0
+
+
+def add_wall_motion(
+    builder: Any,
+    plant: Any,
+    abdomen: Abdomen,
+    params: WallMotionParams,
+    duration: float,
+) -> None:
+    """Connects the wall's servos to its motion.
+
+    Args:
+        builder: The diagram that owns the plant.
+        plant: The finalized plant.
+        abdomen: What `add_abdomen` returned.
+        params: The motion.
+        duration: How long it is needed, in s.
+
+    Raises:
+        ValueError: If a parameter makes no sense.
+    """
+    params.check()
+    if params.still:
+        hold_still(builder, plant, abdomen.wall_instance)
+        return
+    times = np.arange(0.0, duration + 1.0, _KNOT)
+    if any(params.step):
+        edge = params.step_time
+        times = np.sort(np.append(times, [edge - 1e-3, edge]))
+        times = times[np.append(True, np.diff(times) > 1e-6)]
+    # A PD servo that is sent positions alone lags by kd / kp: sent ahead by it.
+    p = abdomen.params
+    lead = 2.0 * sqrt(p.wall_mass / p.wall_stiffness)
+    samples = np.zeros((6, len(times)))
+    slopes = np.zeros((6, len(times)))
+    small = 1e-4
+    for i, time in enumerate(times.tolist()):
+        before, at, after = (
+            np.array(params.displacement(time + d)) for d in (-small, 0.0, small)
+        )
+        v = (after - before) / (2.0 * small)
+        if np.linalg.norm(v) > 1.0:  # the step's edge
+            v = np.zeros(3)
+        samples[:3, i], slopes[:3, i] = at + lead * v, v
+    motion = PiecewisePolynomial.CubicHermite(times, samples, slopes)
+    source = builder.AddNamedSystem("wall_motion", TrajectorySource(motion))
+    builder.Connect(
+        source.get_output_port(),
+        plant.get_desired_state_input_port(abdomen.wall_instance),
+    )

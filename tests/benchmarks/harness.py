@@ -1,0 +1,122 @@
+"""Runs a planner through scenes and measures what becomes of the robot."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import atan2, cos, hypot, sin
+from time import perf_counter
+
+from systems.switching.unicycle_control import UnicycleControlParams, heading_law
+from tests.benchmarks.scenes import Frame, Robot, Scene
+
+Seen = list[tuple[float, float, float, float, float, float]]
+"""Track identity, x, y, radius, v_x, v_y of the obstacles in sight."""
+
+Command = tuple[float, float, bool]
+"""Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
+
+Step = Callable[[float, float, float, float, float, Seen], Command]
+"""(x, y, heading, v_x, v_y, obstacles in sight) -> what to do."""
+
+Planner = Callable[[Scene], Step]
+"""Makes a fresh planner for a scene."""
+
+
+@dataclass
+class Result:
+    """What became of one run."""
+
+    outcome: str  # "reached", "collided" or "timeout"
+    time: float  # s
+    clearance: float  # m, least distance between surfaces
+    length: float  # m
+    ratio: float  # length over the straight way
+    walls: list[float]  # s, wall time of each planner step
+    path: list[tuple[float, float]]
+
+
+def closest(qx: float, qy: float, ux: float, uy: float, dt: float) -> float:
+    """Least distance from the origin while q moves with velocity u for dt."""
+    uu = ux * ux + uy * uy
+    t = 0.0
+    if uu > 0.0:
+        t = min(max(-(qx * ux + qy * uy) / uu, 0.0), dt)
+    return hypot(qx + t * ux, qy + t * uy)
+
+
+def unicycle(
+    robot: Robot,
+    pose: tuple[float, float, float],
+    speeds: tuple[float, float],
+    wanted: Command,
+    dt: float,
+) -> tuple[tuple[float, float, float], tuple[float, float]]:
+    """One step of the heading law on a unicycle with limited accelerations."""
+    x, y, theta = pose
+    speed, rate = speeds
+    law = UnicycleControlParams(
+        4.0, robot.speed, robot.turn_rate, robot.turn_acceleration
+    )
+    target, turn = heading_law(law, theta, *wanted)
+    dv = robot.acceleration * dt
+    dw = robot.turn_acceleration * dt
+    speed = min(max(target, speed - dv), speed + dv)
+    rate = min(max(turn, rate - dw), rate + dw)
+    middle = theta + 0.5 * dt * rate
+    pose = (
+        x + dt * speed * cos(middle),
+        y + dt * speed * sin(middle),
+        theta + dt * rate,
+    )
+    return pose, (speed, rate)
+
+
+def run(scene: Scene, planner: Planner) -> Result:
+    """Runs one scene until the goal, a collision or the time limit."""
+    robot, dt = scene.robot, scene.dt
+    x, y = scene.start
+    theta = atan2(scene.goal[1] - y, scene.goal[0] - x)
+    speeds = (0.0, 0.0)
+    vx = vy = 0.0
+    step = planner(scene)
+    clearance, length = float("inf"), 0.0
+    walls: list[float] = []
+    path = [(x, y)]
+    straight = hypot(scene.goal[0] - x, scene.goal[1] - y)
+    outcome = "timeout"
+    k = 0
+    frame: Frame = scene.frames(0)
+    for k in range(int(scene.time_limit / dt)):
+        seen = [
+            (float(i), a, b, r, u, v)
+            for i, (a, b, r, u, v) in enumerate(frame)
+            if hypot(a - x, b - y) <= robot.vision
+        ]
+        start = perf_counter()
+        wanted = step(x, y, theta, vx, vy, seen)
+        walls.append(perf_counter() - start)
+        if robot.holonomic:
+            size = hypot(wanted[0], wanted[1])
+            scale = min(1.0, robot.speed / size) if size else 0.0
+            vx, vy = wanted[0] * scale, wanted[1] * scale
+            nx, ny = x + dt * vx, y + dt * vy
+        else:
+            (nx, ny, theta), speeds = unicycle(robot, (x, y, theta), speeds, wanted, dt)
+            vx, vy = (nx - x) / dt, (ny - y) / dt
+        after = scene.frames(k + 1)
+        for (a, b, r, _, _), (c, d, _, _, _) in zip(frame, after, strict=True):
+            qx, qy = a - x, b - y
+            ux, uy = (c - a) / dt - vx, (d - b) / dt - vy
+            clearance = min(clearance, closest(qx, qy, ux, uy, dt) - r - robot.radius)
+        length += hypot(nx - x, ny - y)
+        x, y = nx, ny
+        frame = after
+        path.append((x, y))
+        if clearance < 0.0:
+            outcome = "collided"
+            break
+        if hypot(scene.goal[0] - x, scene.goal[1] - y) < robot.reach:
+            outcome = "reached"
+            break
+    return Result(
+        outcome, (k + 1) * dt, clearance, length, length / straight, walls, path
+    )

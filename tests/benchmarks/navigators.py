@@ -1,0 +1,152 @@
+"""Every planner of the benchmark: our own, and peers if their packages are there.
+
+All get the same body and control law, and all may retreat backwards from an
+obstacle that comes within two seconds.
+"""
+
+from importlib.util import find_spec
+
+from systems.switching.arcs import time_to_enter
+from systems.switching.classical_planner import ClassicalParams, summed_fields
+from systems.switching.statechart_planner import (
+    Manoeuvre,
+    StatechartParams,
+    statechart_step,
+)
+from systems.switching.switching_rules import plan
+from systems.switching.switching_state import SwitchingParams, SwitchingState
+from tests.benchmarks.harness import Command, Planner, Seen, Step
+from tests.benchmarks.scenes import Scene
+
+MARGIN = 0.1
+"""Distance [m] that the peers keep from obstacles' surfaces."""
+
+
+def switching(scene: Scene) -> Step:
+    """The switching planner with its defaults; only the body is the scene's."""
+    robot = scene.robot
+    params = SwitchingParams(
+        body_radius=robot.radius,
+        speed=robot.speed,
+        vision=robot.vision,
+        response=0.0 if robot.holonomic else SwitchingParams.response,
+    )
+    state = SwitchingState()
+
+    def step(
+        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+    ) -> Command:
+        nonlocal state
+        result = plan(params, state, (x, y), (vx, vy), scene.goal, seen)
+        state = result.state
+        return result.v_x, result.v_y, result.retreat
+
+    return step
+
+
+def _retreats(scene: Scene, x: float, y: float, seen: Seen) -> bool:
+    moving = [o for o in seen if o[4] or o[5]]
+    clearance = scene.robot.radius + 2.0 * MARGIN
+    return time_to_enter(x, y, 0.0, 0.0, moving, clearance) < 2.0
+
+
+def classical(scene: Scene) -> Step:
+    """Khatib's sum."""
+    params = ClassicalParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
+
+    def step(
+        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+    ) -> Command:
+        velocity = summed_fields(params, (x, y), scene.goal, seen)
+        return *velocity, _retreats(scene, x, y, seen)
+
+    return step
+
+
+def statechart(scene: Scene) -> Step:
+    """The thesis's statechart, for obstacles that stand."""
+    params = StatechartParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
+    memory = Manoeuvre()
+
+    def step(
+        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+    ) -> Command:
+        nonlocal memory
+        ux, uy, memory = statechart_step(params, memory, (x, y), scene.goal, seen)
+        return ux, uy, _retreats(scene, x, y, seen)
+
+    return step
+
+
+def orca(scene: Scene) -> Step:
+    """ORCA as `pyrvo` has it (RVO2)."""
+    import pyrvo
+
+    robot = scene.robot
+
+    def step(
+        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+    ) -> Command:
+        world = pyrvo.RVOSimulator()
+        world.set_time_step(scene.dt)
+        world.set_agent_defaults(10.0, 20, 5.0, 5.0, robot.radius, robot.speed)
+        world.add_agent([x, y])
+        world.set_agent_velocity(0, [vx, vy])
+        world.set_agent_radius(0, robot.radius + MARGIN)
+        gx, gy = scene.goal[0] - x, scene.goal[1] - y
+        size = max((gx * gx + gy * gy) ** 0.5, 1e-9)
+        speed = min(robot.speed, 2.0 * size)
+        world.set_agent_pref_velocity(0, [speed * gx / size, speed * gy / size])
+        for k, (_, a, b, r, u, v) in enumerate(seen, start=1):
+            world.add_agent([a, b])
+            world.set_agent_radius(k, r)
+            world.set_agent_velocity(k, [u, v])
+        world.do_step()
+        chosen = world.get_agent_velocity(0)
+        return chosen.x, chosen.y, _retreats(scene, x, y, seen)
+
+    return step
+
+
+def hrvo(scene: Scene) -> Step:
+    """HRVO as `navground` has it."""
+    from navground import core
+    import numpy as np
+
+    robot = scene.robot
+    behavior = core.Behavior.make_type("HRVO")
+    behavior.kinematics = core.kinematics.OmnidirectionalKinematics(robot.speed)
+    behavior.radius = robot.radius
+    behavior.safety_margin = MARGIN
+    behavior.optimal_speed = robot.speed
+    behavior.horizon = 5.0
+    behavior.target = core.Target.Point(scene.goal, 0.5 * robot.reach)
+
+    def step(
+        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+    ) -> Command:
+        behavior.pose = core.Pose2((x, y), 0.0)
+        behavior.twist = core.Twist2((vx, vy), 0.0)
+        behavior.environment_state.neighbors = [
+            core.Neighbor(np.array([a, b]), r, np.array([u, v]), int(i))
+            for i, a, b, r, u, v in seen
+        ]
+        twist = behavior.compute_cmd(scene.dt)
+        ux, uy = twist.velocity
+        return float(ux), float(uy), _retreats(scene, x, y, seen)
+
+    return step
+
+
+def planners() -> dict[str, Planner]:
+    """All planners that can run here, by name."""
+    found: dict[str, Planner] = {
+        "switching": switching,
+        "statechart": statechart,
+        "Khatib's sum": classical,
+    }
+    if find_spec("pyrvo"):
+        found["ORCA (pyrvo)"] = orca
+    if find_spec("navground"):
+        found["HRVO (navground)"] = hrvo
+    return found

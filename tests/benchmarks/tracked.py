@@ -1,0 +1,52 @@
+"""O as the robot sees it: through the optical tracker and the trajectory estimator."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from systems.auto_guidance import trajectory_estimator
+from systems.auto_guidance.optical_tracker import OpticalTrackerParams, disturb
+from systems.auto_guidance.trajectory_estimator import TrajectoryEstimatorParams
+from systems.common.geometry import sub, unit, xyz
+
+
+def tracked(
+    seed: int, number: int, wall_height: float
+) -> Callable[[float, np.ndarray], np.ndarray]:
+    """A tracker and an estimator with their defaults, for one scene.
+
+    A frame is delivered a period after its exposure (latency 14.2 ms), with the noise
+    of a Polaris; O's fulcrum is found from its shaft's lines.
+
+    Args:
+        seed: Of the noise.
+        number: Of the scene.
+        wall_height: Of the abdominal wall where O enters, m; known to within 10 mm.
+
+    Returns:
+        A function of the time and the exact estimate (17) that gives the estimate (17).
+    """
+    rng = np.random.default_rng([seed, 13, number])
+    body = OpticalTrackerParams().body
+    params = TrajectoryEstimatorParams(wall_height=wall_height)
+    record = trajectory_estimator.constants(params)[0]
+    state = trajectory_estimator.initial(params)
+    frames: list[np.ndarray] = []
+
+    def sense(time: float, exact: np.ndarray) -> np.ndarray:
+        nonlocal state
+        p = xyz(exact, 0)
+        shaft = p + unit(sub(p, xyz(exact, 9)))
+        seen = disturb(
+            shaft,
+            rng.standard_normal(6),
+            body.lever,
+            body.sigma_position(),
+            body.sigma_direction(),
+        )
+        frames.append(np.array(seen + (time, 1.0)))
+        if len(frames) > 1:
+            state = trajectory_estimator.absorb(record, state, frames.pop(0))
+        return trajectory_estimator.predict(record, state, time)
+
+    return sense

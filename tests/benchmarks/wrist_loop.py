@@ -1,0 +1,206 @@
+"""A kinematic closed loop to develop on: no plant, the same algorithms.
+
+The arm is two points (sensor's origin and tip), each a critically damped
+second-order tracker with velocity feed-forward; the wall is `wall_model`'s
+spring on a moving fulcrum. It runs some 50 times faster than real time.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import exp, pi, sqrt
+
+import numpy as np
+
+from plants.abdomen.wall_motion import wave
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
+from systems.passive_wrist.wrist_law import (
+    DONE,
+    FROZEN,
+    PROBE,
+    WristParams,
+    command,
+    constants,
+    initial,
+    next_state,
+)
+
+LENGTH, INSIDE = 0.40, 0.18
+
+
+@dataclass
+class Wall:
+    """A moving wall: true fulcrum and stiffness against time."""
+
+    p0: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    amplitude: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    rate: float = 0.2
+    wave: str = "sine"
+    phase: float = 0.0
+    step: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    step_at: float = 1e9
+    step_time: float = 0.02
+    rise: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    rise_at: float = 1e9
+    rise_time: float = 5.0
+    stiffness: float = 500.0
+    stiffer: float = 0.0
+    damping: float = 5.0
+
+    def position(self, t: float) -> list[float]:
+        """True fulcrum in m."""
+        phase = self.rate * t + self.phase
+        g = wave(self.wave, phase)
+        s = min(max((t - self.step_at) / self.step_time, 0.0), 1.0)
+        r = min(max((t - self.rise_at) / self.rise_time, 0.0), 1.0)
+        r = r * r * (3 - 2 * r)
+        return [
+            self.p0[k] + self.amplitude[k] * g + self.step[k] * s + self.rise[k] * r
+            for k in (0, 1, 2)
+        ]
+
+    def velocity(self, t: float) -> list[float]:
+        """Its velocity in m/s."""
+        a, b = self.position(t - 1e-4), self.position(t + 1e-4)
+        return [(b[k] - a[k]) / 2e-4 for k in (0, 1, 2)]
+
+    def stiffness_at(self, t: float) -> float:
+        """True stiffness in N/m."""
+        r = min(max((t - self.rise_at) / self.rise_time, 0.0), 1.0)
+        return self.stiffness * (1.0 + self.stiffer * r)
+
+
+@dataclass
+class Case:
+    """One closed-loop run."""
+
+    wall: Wall = field(default_factory=Wall)
+    fulcrum: FulcrumParams = field(default_factory=FulcrumParams)
+    wrist: WristParams = field(default_factory=WristParams)
+    tip: Callable[[float], tuple[list[float], list[float]]] | None = None
+    duration: float = 20.0
+    arm_rate: float = 8.0
+    force_noise: float = 0.05
+    moment_noise: float = 0.005
+    bias_walk: float = 0.005
+    moment_bias_walk: float = 0.0005
+    delay: int = 0  # samples that the force is late
+    seed: int = 0
+
+
+def arcs(
+    start: float, angle: float = np.deg2rad(25.0), period: float = 8.0
+) -> Callable[[float], tuple[list[float], list[float]]]:
+    """Altitude arcs of +-angle about the origin, from `start` on."""
+
+    def tip(t: float) -> tuple[list[float], list[float]]:
+        w = 2 * pi / period
+        tau = max(t - start, 0.0)
+        ramp = min(tau / 0.5, 1.0)
+        a = angle * np.sin(w * tau) * ramp
+        da = angle * (w * np.cos(w * tau) * ramp + np.sin(w * tau) * (tau < 0.5) * 2.0)
+        if tau == 0.0:
+            da = 0.0
+        p = [INSIDE * np.sin(a), 0.0, -INSIDE * np.cos(a)]
+        v = [INSIDE * np.cos(a) * da, 0.0, INSIDE * np.sin(a) * da]
+        return [float(q) for q in p], [float(q) for q in v]
+
+    return tip
+
+
+def hold(t: float) -> tuple[list[float], list[float]]:
+    """A tip that stands still below the origin."""
+    return [0.0, 0.0, -INSIDE], [0.0, 0.0, 0.0]
+
+
+def run(case: Case) -> dict[str, np.ndarray]:
+    """Runs a case; the shaft starts unloaded at the true fulcrum."""
+    rng = np.random.default_rng(case.seed)
+    dt = case.fulcrum.period
+    estimator = FulcrumTracker(case.fulcrum)
+    law = constants(case.wrist)
+    z, state = estimator.initial(), initial(case.wrist)
+    tip = case.tip or hold
+    wall = case.wall
+    p_tip, _ = tip(0.0)
+    p_WI = np.array(wall.position(0.0))
+    u = np.array(p_tip) - p_WI
+    u /= np.linalg.norm(u)
+    x = np.concatenate([np.array(p_tip) - LENGTH * u, p_tip])  # sensor, tip
+    dx = np.zeros(6)
+    w = 2 * pi * case.arm_rate
+    decay = exp(-w * dt)
+    fbias, mbias = rng.normal(0, 0.01, 3), rng.normal(0, 0.001, 3)
+    late: list[tuple[np.ndarray, np.ndarray]] = []
+    rows = []
+    for i in range(round(case.duration / dt)):
+        t = i * dt
+        p_WI, v_WI = np.array(wall.position(t)), np.array(wall.velocity(t))
+        p_WS = x[:3]
+        shaft = x[3:] - x[:3]
+        length = np.linalg.norm(shaft)
+        u = shaft / length
+        du = (dx[3:] - dx[:3]) / length
+        du -= u * (u @ du)
+        lam = u @ (p_WI - p_WS)
+        r = p_WI - p_WS - lam * u
+        rel = v_WI - dx[:3] - lam * du
+        rel -= u * (u @ rel)
+        f = wall.stiffness_at(t) * r + wall.damping * rel
+        m = lam * np.cross(u, f)
+        fbias += rng.normal(0, case.bias_walk * sqrt(dt), 3)
+        mbias += rng.normal(0, case.moment_bias_walk * sqrt(dt), 3)
+        fm = f + fbias + rng.normal(0, case.force_noise, 3)
+        mm = m + mbias + rng.normal(0, case.moment_noise, 3)
+        late.append((fm, mm))
+        fm, mm = late[max(0, len(late) - 1 - case.delay)]
+        shaft = np.concatenate([p_WS, u, dx[:3], du])
+        z = estimator.step(z, shaft, np.concatenate([fm, mm, [1.0]]), t)
+        truth = np.concatenate([p_WI, v_WI])
+        p_WP, v_WP = tip(t)
+        wanted = np.array([*p_WP, 0.0, 0.0, -1.0, *v_WP, 0.0, 0.0, 0.0, t])
+        wrench = np.concatenate([fm, mm, [1.0]])
+        report = estimator.report(z, u, t)
+        state = next_state(law, state, wanted, shaft, wrench, report, truth, t)
+        C = estimator.covariance(z)
+        across, along, stiffness = report[6], report[7], report[8]
+        pose = command(state, wanted)
+        p_d, u_d, v_d, du_d = (np.array(pose[k : k + 3]) for k in (0, 3, 6, 9))
+        goal = np.concatenate([p_d - LENGTH * u_d, p_d])
+        dgoal = np.concatenate([v_d - LENGTH * du_d, v_d])
+        error = report[0:3] - p_WI
+        rows.append(
+            (
+                t,
+                float(np.linalg.norm(f)),
+                float(np.linalg.norm(r)),
+                *error,
+                float(np.linalg.norm(error - u * (u @ error))),
+                across,
+                along,
+                stiffness,
+                float(error @ np.linalg.solve(C, error)),
+                estimator.breathing(z),
+                state[FROZEN],
+                state[PROBE] * (1 - state[DONE]),
+                z[estimator.at("jumps")],
+                z[estimator.at("nis")],
+                z[estimator.at("phase")],
+                z[estimator.at("refused")],
+                float(u @ error),
+            )
+        )
+        # Exact critically damped tracking of a target that moves linearly.
+        e = x - goal
+        de = dx - dgoal
+        e, de = (e + (de + w * e) * dt) * decay, (de - (de + w * e) * w * dt) * decay
+        x, dx = goal + dgoal * dt + e, dgoal + de
+    names = (
+        *("t", "force", "offset", "ex", "ey", "ez", "lateral", "across", "along"),
+        *("K", "nees", "rate", "frozen", "probe", "jumps", "nis", "phase"),
+        *("refused", "depth"),
+    )
+    a = np.array(rows)
+    out = {k: a[:, i] for i, k in enumerate(names)}
+    out["error"] = np.linalg.norm(a[:, 3:6], axis=1)
+    return out

@@ -1,0 +1,151 @@
+"""The six navigation scenarios must show what the thesis promises, in the full loop."""
+
+import functools
+import json
+
+import numpy as np
+import pytest
+
+from diagrams.common.run import Run, run_scenario, simulate
+from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.navigation.figures import thesis_figures
+from diagrams.navigation.plots import plots
+from diagrams.navigation.scenario import outruns
+from systems.switching.switching_state import MODES
+
+NAMES = ("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd")
+KEYS = {
+    *("reached", "collided", "time_to_target", "min_clearance", "path_ratio"),
+    *("planner_step_median", "mode_switches", "real_time_factor"),
+}
+
+
+@functools.cache
+def run(name: str, *overrides: str) -> Run:
+    """One run of each scenario serves all tests."""
+    result = simulate(load_scenario(f"nav_{name}", list(overrides)))
+    assert not result.error
+    return result
+
+
+def modes(r: Run) -> set[str]:
+    """The planner's states in a run."""
+    return {MODES[int(m)] for m in np.round(r.matrix("planner.mode")[:, 0])}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_scenario_arrives_without_collision(name):
+    figures = run(name).metrics
+    assert set(figures) >= KEYS
+    assert figures["reached"] and not figures["collided"]
+    assert figures["min_clearance"] > 0.05
+    assert figures["mode_switches"] >= 2
+    json.dumps(figures, allow_nan=False)
+
+
+def test_the_local_minimum_stops_the_classical_method_alone():
+    classical = run("local_minimum", "planner=classical")
+    assert not classical.metrics["reached"] and not classical.metrics["collided"]
+    speed = classical.matrix("robot.state")[:, 3]
+    assert np.abs(speed[-40:]).max() < 0.01  # it stands still for ever
+    assert abs(classical.matrix("robot.state")[-1, 0] - 5.0) < 0.05  # in the middle
+    assert run("local_minimum").metrics["reached"]
+
+
+def test_the_trap_is_left_round_its_group():
+    assert {"group", "leave", "attractive"} <= modes(run("u_trap"))
+    assert not run("u_trap", "planner=classical").metrics["reached"]
+
+
+def test_limits_of_the_robot_hold():
+    r = run("u_trap")
+    v, omega = r.matrix("robot.state")[:, 3:].T
+    assert np.abs(v).max() < 0.5 + 1e-6 and np.abs(omega).max() < 1.8 + 1e-6
+    period = r.study.log_period
+    assert np.abs(np.diff(v)).max() < 1.0 * period + 1e-6
+    assert np.abs(np.diff(omega)).max() < 3.5 * period + 1e-6
+
+
+def test_the_statechart_passes_one_standing_obstacle():
+    r = run("one_static", "planner=statechart")
+    assert r.metrics["reached"]
+    states = np.round(r.matrix("planner.mode")[:, 0]).astype(int).tolist()
+    assert list(dict.fromkeys(states)) == [0, 1, 2] and states[-1] == 0
+
+
+def test_noise_is_repeatable_and_survived():
+    noise = ("perception.position_noise=0.02", "perception.velocity_noise=0.05")
+    first = run("three_moving", *noise)
+    again = simulate(load_scenario("nav_three_moving", list(noise)))
+    assert first.metrics["reached"]
+    for name, column in first.signals.items():
+        np.testing.assert_array_equal(column, again.signals[name])
+
+
+def test_the_gap_is_passed_with_noise():
+    noise = ("perception.position_noise=0.01", "perception.velocity_noise=0.05")
+    r = run("local_minimum", *noise)
+    assert r.metrics["reached"] and not r.metrics["collided"]
+
+
+def test_a_faster_obstacle_is_told_and_the_robot_does_its_best():
+    scenario = load_scenario("nav_one_moving")
+    scenario.obstacles[0].velocity = [0.0, -0.8]
+    scenario.obstacles[0].start = [4.0, 6.4]
+    assert outruns(scenario) == [0]
+    figures = simulate(scenario).metrics
+    assert figures["faster_obstacles"] == [0] and figures["outrun_time"] > 0.0
+    assert figures["reached"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["goal=[4.0, 0.3]"], r"goal=.* lies inside obstacles\[0\]"),
+        (["start=[3.4, 0.1]"], r"start=.* inside the safety circle of obstacles\[0\]"),
+        (["perception.vision=0.6"], r"R_i <|must be greater"),
+        (["goal=[.nan, 0.0]"], r"finite"),
+        (["start=[0.0]"], r"start=\[0.0\]: expected 2"),
+        (["planner=magic"], r"planner='magic': choose from|did you mean"),
+        (["robot.radius=0.0"], r"radius=0.0 must be positive"),
+        (["reach=0.0"], r"reach=0.0 m: expected > 0"),
+        (["crowd.people=3"], r"expected one of them"),
+        (["switching.margin=[0.1]"], r"did you mean 'margins'|switching.margin"),
+    ],
+)
+def test_bad_input_is_refused(overrides, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("nav_one_static", overrides)
+
+
+def test_negative_radius_is_refused():
+    scenario = load_scenario("nav_one_static")
+    scenario.obstacles[0].radius = -0.5
+    with pytest.raises(ScenarioError, match=r"radius=-0.5 m must be positive"):
+        simulate(scenario)
+
+
+def test_plots_of_two_methods_and_of_the_thesis():
+    figures = plots(run("local_minimum"))
+    assert {"path", "motion", "potential", "figure_04", "figure_12"} <= set(figures)
+    labels = [text.get_text() for text in figures["path"].legends[0].get_texts()]
+    assert labels[0].startswith("switching: arrives")
+    assert labels[1] == "classical: does not arrive"
+    assert len(thesis_figures()) == 10
+
+
+def test_results_with_a_replay(tmp_path):
+    result = run_scenario(load_scenario("nav_one_static", duration=2.0), tmp_path)
+    assert not result.error
+    for name in ("replay.html", "path.png", "motion.png", "metrics.json"):
+        assert (tmp_path / name).stat().st_size > 100
+
+
+@pytest.mark.browser
+def test_replay_shows_the_robot(tmp_path, screenshot):
+    from matplotlib.image import imread
+
+    run_scenario(load_scenario("nav_one_static", duration=4.0), tmp_path)
+    picture = imread(screenshot(tmp_path / "replay.html"))[..., :3]
+    red = (picture[..., 0] > 0.5) & (picture[..., 1] < 0.35) & (picture[..., 2] < 0.35)
+    assert red.sum() > 200  # the obstacle

@@ -1,0 +1,135 @@
+"""The wrist's scenarios must show the issue's figures, with the arm in the loop."""
+
+from dataclasses import replace
+import functools
+import json
+
+import numpy as np
+import pytest
+
+from diagrams.common.run import Run, simulate
+from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.wrist_metrics import last_above, settled
+
+
+@functools.cache
+def run(name: str, *overrides: str) -> Run:
+    """One run of each scenario serves all tests."""
+    result = simulate(load_scenario(name, overrides))
+    assert not result.error
+    json.dumps(result.metrics, allow_nan=False)
+    return result
+
+
+def test_arcs_about_a_wrong_guess():
+    figures = run("pwe_arc").metrics
+    assert figures["fulcrum_convergence_time"] <= 2.0
+    assert figures["rms_lateral_force"] <= 0.1
+    assert figures["lateral_convergence_time"] <= 0.5
+    assert figures["estimates_refused"] == 0
+
+
+def test_arcs_under_breathing():
+    figures = run("pwe_arc_breathing").metrics
+    assert figures["fulcrum_convergence_time"] <= 10.0
+    assert figures["fulcrum_error_3s"] <= 2e-3
+    assert figures["rms_lateral_force"] <= 0.1
+    assert figures["breathing_rate_estimate"] == pytest.approx(0.2, rel=0.02)
+
+
+def test_step_of_the_wall():
+    figures = run("pwe_step").metrics
+    assert figures["time_to_2N"] <= 0.25
+    assert figures["time_to_02N"] <= 0.45
+    assert figures["time_frozen"] == 0.0
+    assert figures["jumps_followed"] == 1
+
+
+def test_breathing_under_a_ventilator_against_the_printed_law():
+    figures = run("pwe_breathing").metrics
+    assert figures["rms_lateral_force"] <= 0.08
+    assert figures["rms_fulcrum_error"] <= 0.15e-3
+    printed = run("pwe_breathing", "wrist=spring").metrics
+    assert printed["rms_lateral_force"] >= 3.0 * figures["rms_lateral_force"]
+
+
+def test_insufflation():
+    figures = run("pwe_insufflation").metrics
+    assert figures["max_lateral_force"] <= 0.2
+    assert figures["time_frozen"] == 0.0
+
+
+def test_known_fulcrum_under_breathing():
+    scenario = load_scenario("pwe_breathing", ["wrist=known"], duration=8.0)
+    figures = simulate(replace(scenario, measure_from=2.0)).metrics
+    assert figures["rms_lateral_force"] < 0.03
+
+
+def test_off_stands_still_for_the_wall_is_loaded():
+    result = run("pwe_arc", "wrist=off")
+    tip = result.matrix("robot.tool")[:, 3:]
+    assert result.metrics["max_lateral_force"] > 5.0
+    assert np.ptp(tip[-600:], axis=0).max() < 1e-4
+    assert result.metrics["time_frozen"] > 10.0
+
+
+def test_a_lost_sensor_stops_the_task_until_it_is_back():
+    overrides = ["tool_wrench.lost=[7.0, 8.0]"]
+    result = simulate(load_scenario("pwe_arc", overrides, duration=10.0))
+    t, code = result.signals["time"], result.signals["wrist.permission.code"]
+    assert np.all(code[(t > 7.1) & (t < 8.0)] == 9.0)
+    assert np.all(code[t > 8.4] == 0.0)
+    tip = result.matrix("robot.tool")[:, 3:]
+    still = (t > 7.3) & (t < 8.0)
+    assert np.ptp(tip[still], axis=0).max() < 2e-4
+    assert np.ptp(tip[t > 8.5], axis=0).max() > 5e-3
+
+
+def test_gauze_on_a_patient_who_breathes():
+    result = run("gauze_breathing")
+    figures = result.metrics
+    assert figures["reached"] and not figures["contact"]
+    assert figures["min_tool_clearance"] >= 0.004
+    assert figures["rms_lateral_force"] <= 0.3
+    assert figures["final_tip_error"] <= 2e-3
+    assert [stop["reason"] for stop in figures["stops"]] == ["probing the wall"]
+
+
+def test_same_seed_same_figures():
+    one, two = (
+        simulate(load_scenario("pwe_breathing", duration=1.0)).matrix("wrist.fulcrum")
+        for _ in range(2)
+    )
+    np.testing.assert_array_equal(one, two)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("wrist=passive", "choose from pwe, spring, off, known"),
+        ("first_guess=[0.2, 0.0, 0.0]", "at most 0.05 m"),
+        ("abdomen.stiffness=-500.0", r"abdomen.stiffness=-500.0 must be in"),
+        ("fulcrum_estimator.stiffness=-1.0", "no abdominal"),
+        ("tool_wrench.period=0.01", "share their instants"),
+        ("tool_wrench.frame=7", "expected a text"),
+        ("compare=[pew]", "compare='pew'"),
+        ("wall_motion.wave=square", "'sine' or 'ventilator'"),
+    ],
+)
+def test_bad_input(override, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("pwe_arc", [override])
+
+
+def test_settled_and_last_above():
+    t = np.arange(5.0)
+    assert settled(t, np.array([0.0, 3.0, 0.0, 0.0, 0.0]), 1.0) == 2.0
+    assert settled(t, np.zeros(5), 1.0) == 0.0
+    assert settled(t, np.array([0.0, 0.0, 0.0, 0.0, 9.0]), 1.0) is None
+    assert last_above(t, np.array([0.0, 9.0, 3.0, 1.0, 0.0]), 2.0) == 3.0
+
+
+def test_a_late_sensor_costs_little_when_force_and_pose_belong_together():
+    figures = run("pwe_breathing", "tool_wrench.delay=2", "compare=[]").metrics
+    assert figures["rms_lateral_force"] < 0.15
+    assert figures["max_lateral_force"] < 1.0

@@ -1,0 +1,43 @@
+"""The robot is a unicycle with limits, integrated by Drake."""
+
+from math import cos, sin
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+import pytest
+
+from plants.turtlebot.turtlebot import TurtlebotParams, make_turtlebot
+
+
+def drive(speed, rate, duration, start=(1.0, 2.0, 0.5)):
+    robot = make_turtlebot(TurtlebotParams(), list(start))
+    context = robot.CreateDefaultContext()
+    robot.get_input_port().FixValue(context, [speed, rate])
+    simulator = Simulator(robot, context)
+    simulator.AdvanceTo(duration)
+    return robot.get_output_port().Eval(simulator.get_context())
+
+
+def test_it_starts_where_it_is_put():
+    np.testing.assert_allclose(drive(0.0, 0.0, 0.1), [1.0, 2.0, 0.5, 0.0, 0.0])
+
+
+def test_it_accelerates_and_keeps_its_greatest_speed():
+    assert drive(9.0, 0.0, 0.2)[3] == pytest.approx(0.2, abs=0.01)  # 1 m/s^2
+    x, y, _, v, _ = drive(9.0, 0.0, 5.0)
+    assert v == pytest.approx(0.5, abs=1e-6)
+    assert (x - 1.0) * sin(0.5) == pytest.approx((y - 2.0) * cos(0.5), abs=1e-6)
+    # Half a second to speed up costs an eighth of a metre.
+    assert np.hypot(x - 1.0, y - 2.0) == pytest.approx(2.5 - 0.125, abs=0.005)
+
+
+def test_it_drives_circles():
+    state = drive(0.5, 1.0, 2.0 * np.pi + 2.0)
+    later = drive(0.5, 1.0, 4.0 * np.pi + 2.0)
+    np.testing.assert_allclose(later[:2], state[:2], atol=5e-3)
+    assert drive(0.0, 9.0, 3.0)[4] == pytest.approx(1.8, abs=1e-6)
+
+
+def test_bad_parameters_are_refused():
+    with pytest.raises(ValueError, match=r"acceleration=-1.0 must be positive"):
+        make_turtlebot(TurtlebotParams(acceleration=-1.0), [0.0, 0.0, 0.0])

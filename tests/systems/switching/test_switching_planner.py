@@ -1,0 +1,155 @@
+"""The switching planner: its rules, its limits, its speed."""
+
+from math import hypot, inf, nan
+import statistics
+from time import perf_counter
+
+import numpy as np
+import pytest
+
+from systems.switching.switching_planner import SwitchingPlanner
+from systems.switching.switching_rules import plan
+from systems.switching.switching_state import (
+    ATTRACTIVE,
+    BYPASS,
+    GROUP,
+    UNREACHABLE,
+    SwitchingParams,
+    SwitchingState,
+)
+
+PARAMS = SwitchingParams(response=0.0)
+
+
+def step(obstacles, place=(0.0, 0.0), state=None, goal=(8.0, 0.0), params=PARAMS):
+    """One step of a body at rest."""
+    state = state or SwitchingState()
+    return plan(params, state, place, (0.0, 0.0), goal, obstacles)
+
+
+def walk(discs, duration=60.0, goal=(8.0, 0.0), vision=3.0):
+    """A body without inertia walks; modes and least clearance."""
+    place, state, modes, least = (0.0, 0.0), SwitchingState(), [], inf
+    for k in range(int(duration / 0.05)):
+        t = 0.05 * k
+        now = [
+            (float(i), x + t * u, y + t * v, r, u, v)
+            for i, (x, y, r, u, v) in enumerate(discs)
+        ]
+        seen = [o for o in now if hypot(o[1] - place[0], o[2] - place[1]) <= vision]
+        vx, vy, state, *_ = step(seen, place, state, goal)
+        place = (place[0] + 0.05 * vx, place[1] + 0.05 * vy)
+        modes.append(int(state.mode))
+        gaps = [hypot(o[1] - place[0], o[2] - place[1]) - o[3] - 0.18 for o in now]
+        least = min([least, *gaps])
+        if hypot(place[0] - goal[0], place[1] - goal[1]) < 0.1:
+            break
+    return place, modes, least
+
+
+def test_alone_it_goes_straight_and_slows_down_at_the_goal():
+    assert step([])[:2] == (0.5, 0.0)
+    assert step([], goal=(0.1, 0.0))[:2] == pytest.approx((0.2, 0.0))
+    assert step([], goal=(0.0, 0.0))[:2] == (0.0, 0.0)
+
+
+def test_what_does_not_stand_in_the_way_does_not_matter():
+    behind_goal = (0.0, 8.8, 0.0, 0.4, 0.0, 0.0)
+    beside = (1.0, 2.0, 1.2, 0.4, 0.0, 0.0)
+    passing = (2.0, 2.0, 1.5, 0.4, 0.0, 0.5)
+    assert step([behind_goal, beside, passing]).state.mode == ATTRACTIVE
+
+
+def test_the_field_followed_is_one_obstacles_tangent():
+    result = step([(5.0, 2.0, 0.1, 0.4, 0.0, 0.0)])
+    assert (result.state.mode, result.state.track, result.state.side) == (BYPASS, 5, 1)
+    rho = 0.4 + 0.18 + 0.2
+    # Distance of the centre from the ray: the safety circle's radius.
+    assert (result.v_x * 0.1 - result.v_y * 2.0) / 0.5 == pytest.approx(rho)
+    assert hypot(result.v_x, result.v_y) == pytest.approx(0.5)
+
+
+def test_a_crosser_is_passed_behind():
+    result = step([(0.0, 2.0, -2.0, 0.3, 0.0, 0.5 * 0.9)])
+    assert result.state.mode == BYPASS and result.v_y < 0.0
+
+
+@pytest.mark.parametrize("w", [0.0, 0.2, 0.45])
+def test_margins_are_kept(w):
+    place, _, least = walk([(4.0, -4.0 * w / 0.5, 0.4, 0.0, w)])
+    assert hypot(place[0] - 8.0, place[1]) < 0.1
+    assert least > 0.17  # 0.2, less what a step of 50 ms loses
+
+
+def test_a_trap_is_left_round_its_group():
+    line = [(4.0, y, 0.3, 0.0, 0.0) for y in np.arange(-1.5, 1.6, 0.5)]
+    walls = [(x, y, 0.3, 0.0, 0.0) for x in (2.5, 3.0, 3.5) for y in (-1.5, 1.5)]
+    place, modes, least = walk([*line, *walls])
+    assert GROUP in modes
+    assert hypot(place[0] - 8.0, place[1]) < 0.1
+    assert least > 0.05
+
+
+def test_a_goal_walled_in_is_given_up():
+    ring = [
+        (8.0 + 1.2 * np.cos(a), 1.2 * np.sin(a), 0.3, 0.0, 0.0)
+        for a in np.linspace(0.0, 2.0 * np.pi, 16)[:-1]
+    ]
+    place, modes, least = walk(ring, 120.0)
+    assert modes[-1] == UNREACHABLE
+    assert hypot(place[0] - 8.0, place[1]) > 1.2
+    assert least > 0.05
+
+
+def test_a_faster_obstacle_is_told():
+    fast = (0.0, 3.0, 0.0, 0.3, -0.8, 0.0)
+    result = step([fast])
+    assert result.outrun and hypot(result.v_x, result.v_y) > 0.0
+    assert not step([(0.0, 3.0, 0.0, 0.3, -0.4, 0.0)]).outrun
+
+
+def test_within_a_safety_circle_it_leads_out():
+    result = step([(0.0, 0.4, 0.0, 0.2, 0.0, 0.0)])
+    assert result.v_x < 0.01
+
+
+def test_numbers_that_are_none_are_refused():
+    with pytest.raises(ValueError, match="not finite"):
+        step([(0.0, nan, 0.0, 0.3, 0.0, 0.0)])
+    with pytest.raises(ValueError, match="not finite"):
+        step([], place=(nan, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"body_radius": 0.0}, r"body_radius=0.0 must be positive"),
+        ({"speed": -1.0}, r"speed=-1.0 must be positive"),
+        ({"margins": [0.1, 0.2]}, r"margins=\[0.1, 0.2\] must fall; nearest \[0.2"),
+        ({"margins": []}, r"margins=\[\] must be distances"),
+        ({"slower": [1.5]}, r"slower=\[1.5\] must be fractions"),
+        ({"vision": 0.3}, r"vision=0.3 m must be greater"),
+        ({"hysteresis": nan}, r"hysteresis=nan must be >= 0"),
+    ],
+)
+def test_bad_parameters_are_refused(change, message):
+    with pytest.raises(ValueError, match=message):
+        SwitchingPlanner(SwitchingParams(**change))
+
+
+@pytest.mark.parametrize(("count", "limit"), [(5, 20e-6), (20, 120e-6)])
+def test_speed(count, limit):
+    # Medians over scattered worlds; four times the limit, for a busy machine.
+    rng = np.random.default_rng(7)
+    walls = []
+    for _ in range(200):
+        places = rng.uniform(-3.0, 3.0, (count, 2))
+        places += np.sign(places)
+        w = rng.uniform(-0.3, 0.3, (count, 2))
+        seen = [
+            (float(k), *places[k].tolist(), 0.3, *w[k].tolist()) for k in range(count)
+        ]
+        start = perf_counter()
+        step(seen)
+        walls.append(perf_counter() - start)
+    assert statistics.median(walls) < 4.0 * limit
