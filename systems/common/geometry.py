@@ -218,7 +218,9 @@ def segment_triangle_distance(
         return least
     h0 = dot(sub(p0, a), n)
     h1 = dot(sub(p1, a), n)
-    if h0 * h1 <= 0.0 and h0 != h1:
+    # A segment in the triangle's plane pierces nothing; its edges say how far it is.
+    level = 1e-12 * sqrt(area2) * norm(sub(p1, p0))
+    if h0 * h1 <= 0.0 and abs(h0 - h1) > level:
         if _over_face(along(p0, h0 / (h0 - h1), sub(p1, p0)), a, b, c, n):
             return 0.0
     else:

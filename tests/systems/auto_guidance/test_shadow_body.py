@@ -1,6 +1,6 @@
 """The shadow body's properties, against the closest points of two segments."""
 
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -84,6 +84,12 @@ def test_free_depth_is_where_the_distance_falls_to_D(a, tip, p):
 
 @settings(max_examples=60, deadline=None)
 @given(points(), points(), points(), points())
+@example(
+    (-0.0625, 0.0, 0.0),
+    (-0.03125, 0.0, 0.0),
+    (0.0, 0.0, 0.0625),
+    (0.0625, 7.6e-197, 0.0),
+)
 def test_the_triangle_test_agrees_with_brute_force(a, tip, p, goal):
     assume(geometry.norm(geometry.sub(goal, p)) > 1e-3)
     row = tool(a, tip)
