@@ -102,7 +102,7 @@ class Planner:
         self.goal = np.flatnonzero(reachable.reshape(-1)).astype(np.int32)
         self.progress = progress
         self.rng = np.random.default_rng(self.params.seed)
-        self.deadline = perf_counter() + self.params.time_limit
+        self.deadline = math.inf
 
     def left(self) -> NDArray[np.int32]:
         """Voxels of the goal that are still there."""
@@ -121,6 +121,7 @@ class Planner:
             self.enter()
         while self.share < self.params.target and self.choose():
             self.progress(self.share)
+        self.deadline = perf_counter() + self.params.time_limit
         while self.share < self.params.target and perf_counter() < self.deadline:
             if not self.finish():
                 break

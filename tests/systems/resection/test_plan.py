@@ -15,7 +15,7 @@ from systems.resection.space import SOLID
 def planned(ball_session):
     session = ball_session()
     reach = find_reach(session)
-    Planner(session, reach.mask, PlannerParams(time_limit=20.0)).run()
+    Planner(session, reach.mask, PlannerParams()).run()
     return session, reach
 
 
