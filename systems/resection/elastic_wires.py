@@ -144,7 +144,7 @@ class ElasticWires(Block):
         return self._pull.Eval(context)[0].tolist()
 
     def _calc_measured(self, context: Any) -> Sequence[float]:
-        lengths = self._lengths.Eval(context)
+        lengths = np.array(self._lengths.Eval(context))  # a copy: ports are shared
         lengths[:9] += self._pull.Eval(context)[0] / self._drive.wire_stiffness
         return lengths.tolist()
 

@@ -133,3 +133,17 @@ def test_no_state_hides_outside_the_context(kind):
             context.get_discrete_state(group).value(),
             before.get_discrete_state(group).value(),
         )
+
+
+@pytest.mark.parametrize("kind", BLOCKS, ids=lambda kind: kind.__name__)
+def test_inputs_are_left_alone(kind):
+    dut = kind()
+    context = fixed_context(dut)
+    ports = [dut.get_input_port(i) for i in range(dut.num_input_ports())]
+    vectors = [p for p in ports if p.get_data_type() == PortDataType.kVectorValued]
+    before = [np.array(port.Eval(context)) for port in vectors]
+    simulator = Simulator(dut, context)
+    simulator.AdvanceTo(0.03)
+    outputs(dut, context)
+    for port, value in zip(vectors, before, strict=True):
+        np.testing.assert_array_equal(port.Eval(context), value)
