@@ -84,7 +84,7 @@ class ResectionScenario(Scenario):
     spacing: float = 0.5e-3
     margin: float = 1.0e-3
     tracking: float = 0.3e-3
-    clearance: float = 0.09e-3
+    clearance: float = 0.13e-3
     accuracy: float = 0.05e-3
     procedures: list[Procedure] = field(default_factory=list)
     automatic: bool = False

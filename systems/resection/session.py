@@ -87,7 +87,7 @@ class Session:
 
     volume: Volume
     params: SnakeParams
-    clearance: float = 0.09e-3
+    clearance: float = 0.13e-3
     accuracy: float = 0.05e-3
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
