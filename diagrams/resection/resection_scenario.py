@@ -19,6 +19,7 @@ from systems.resection.procedure_player import ProcedurePlayerParams, schedule
 from systems.resection.reach import Reach, find_reach
 from systems.resection.resection_ik import ResectionIkParams
 from systems.resection.session import Session, load_session
+from systems.resection.space import NEIGHBOUR
 from systems.resection.tissue import (
     SyntheticTumour,
     Tissue,
@@ -83,7 +84,7 @@ class ResectionScenario(Scenario):
     access: Access = field(default_factory=Access)
     spacing: float = 0.5e-3
     margin: float = 1.0e-3
-    tracking: float = 0.3e-3
+    tracking: float = 0.15e-3
     clearance: float = 0.13e-3
     accuracy: float = 0.05e-3
     procedures: list[Procedure] = field(default_factory=list)
@@ -176,7 +177,8 @@ def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
         access,
         scenario.snake.body_radius,
         scenario.spacing,
-        scenario.margin + scenario.tracking,
+        # A ball whose voxels keep a distance may stand out of them by half a diagonal.
+        scenario.margin + scenario.tracking + NEIGHBOUR * scenario.spacing,
     )
     session = Session(volume, scenario.snake, scenario.clearance, scenario.accuracy)
     return session, tissue.name
