@@ -14,14 +14,17 @@ import numpy as np
 from plants.snake.inverse_kernels import solve_tools
 from systems.common.compiled import compiled
 from systems.resection.snake_body import corners, drive_far
-from systems.resection.space import FREE, SOLID, first_forbidden, roll_back
+from systems.resection.space import FREE, SOLID, count_solid, first_forbidden, roll_back
 from systems.resection.tree import add_node, extend, nearest_nodes, visit
 
 NEAR = 12
 """Nodes near the target among which a step's start is drawn."""
 
-TRIES = 250
-"""Failed attempts after which a voxel is asked for no more."""
+PLACES = 8
+"""Places of the tool looked at for one target."""
+
+WAYS = 3
+"""Ways to a place tried, each from a node near it and with axes of its own."""
 
 
 @compiled
@@ -32,6 +35,21 @@ def tilted(n: Any, spread: float, out: Any) -> None:
     size = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
     for r in range(3):
         out[r] /= size
+
+
+@compiled
+def centre(s: Any, voxel: int, out: Any) -> None:
+    """Where a voxel's centre lies in W, by its flat index, into out (3,)."""
+    _, ny, nz = s.size
+    out[0] = s.origin[0] + s.spacing * (voxel // (ny * nz))
+    out[1] = s.origin[1] + s.spacing * (voxel // nz % ny)
+    out[2] = s.origin[2] + s.spacing * (voxel % nz)
+
+
+@compiled
+def distance2(p: Any, q: Any) -> float:
+    """Square of the distance between two points."""
+    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
 
 
 @compiled
@@ -64,6 +82,7 @@ def grow(
     wanted: Any,
     tries: Any,
     attempts: int,
+    weary: int,
     least: int,
     moving: bool,
     why: Any,
@@ -77,6 +96,7 @@ def grow(
         wanted: Flat indices of voxels to reach.
         tries: Failed attempts so far, int32, one a wanted voxel.
         attempts: How many to make.
+        weary: Failed attempts after which a voxel is asked for no more.
         least: Voxels that a step must free to be made.
         moving: Whether the robot goes from node to node (a plan), or the tree alone
             counts (what could be reached).
@@ -88,69 +108,74 @@ def grow(
     found, far = np.empty(NEAR, np.int64), np.empty(NEAR)
     p, n, m = np.empty((1, 3)), np.empty((1, 3)), np.empty((1, 3))
     c, x = np.empty((8, 3)), np.empty(7)
-    _, ny, nz = s.size
+    v, d, zero = np.empty(3), np.empty(3), np.zeros(3)
     made = 0
     for _ in range(attempts):
-        # Of a few voxels drawn the one asked for least.
-        pick = -1
+        # Of a few voxels drawn the one asked for least, and in a plan the nearest.
+        pick, least_far = -1, math.inf
+        here = t.route[t.size[1] - 1]
         for _ in range(6):
             at = np.random.randint(len(wanted))
-            if s.tau[wanted[at]] != SOLID or tries[at] > TRIES:
+            if s.tau[wanted[at]] != SOLID or tries[at] >= weary:
                 continue
-            if pick < 0 or tries[at] < tries[pick]:
-                pick = at
+            away = 1.0 + tries[at]
+            if moving:
+                centre(s, wanted[at], v)
+                away *= distance2(v, t.tip[here])
+            if away < least_far:
+                pick, least_far = at, away
         if pick < 0:
             continue
         voxel = wanted[pick]
-        i, j, k = voxel // (ny * nz), voxel // nz % ny, voxel % nz
-        v0 = s.origin[0] + s.spacing * i
-        v1 = s.origin[1] + s.spacing * j
-        v2 = s.origin[2] + s.spacing * k
-        fits = False
-        for _ in range(12):
-            tilted(np.zeros(3), 1.0, p[0])
+        centre(s, voxel, v)
+        # Of some places that hold the voxel the one where most is left.
+        most = 0
+        for _ in range(PLACES):
+            tilted(zero, 1.0, d)
             r = b.radius * np.random.random() ** (1 / 3)
-            p[0, 0] = v0 + r * p[0, 0]
-            p[0, 1] = v1 + r * p[0, 1]
-            p[0, 2] = v2 + r * p[0, 2]
-            if first_forbidden(s, p[0, 0], p[0, 1], p[0, 2], b.radius) == FREE:
-                fits = True
-                break
-        if not fits:
-            tries[pick] += 3
+            q0, q1, q2 = v[0] + r * d[0], v[1] + r * d[1], v[2] + r * d[2]
+            if first_forbidden(s, q0, q1, q2, b.radius) == FREE:
+                there = count_solid(s, q0, q1, q2, b.frees)
+                if there > most:
+                    most = there
+                    p[0, 0], p[0, 1], p[0, 2] = q0, q1, q2
+        tries[pick] += 1
+        if most < least:
             continue
         nearest_nodes(t, p[0, 0], p[0, 1], p[0, 2], found, far)
         if far[0] > (3 * b.radius) ** 2:
             continue  # not yet: the frontier is far from here
-        draw = int(NEAR * np.random.random() ** 2)
-        node = found[draw]
-        if node < 0:
-            node = found[0]
-        corners(t.x[node], b.h, b.tool, c)
-        link = 2 * b.h
-        for r in range(3):
-            n[0, r] = (c[6, r] - c[5, r]) / link
-            m[0, r] = (c[4, r] - c[3, r]) / link
-        tries[pick] += 1
-        spread = 0.5 * np.random.random() ** 2
-        tilted(n[0].copy(), spread, n[0])
-        tilted(m[0].copy(), spread, m[0])
-        if not tool_posture(b, p, n, m, x):
-            continue
-        freed, roomed = s.used[0], s.used[1]
-        _, share = drive_far(s, b, t.x[node], x, t.size[1], why)
-        gained = s.used[0] - freed
-        if gained < least:
-            roll_back(s, freed, roomed)
-            continue
-        for r in range(7):
-            x[r] = t.x[node, r] + share * (x[r] - t.x[node, r])
-        if moving:
-            roll_back(s, freed, roomed)
-            if extend(s, b, t, node, x, why) < 0:
+        close = moving and distance2(p[0], t.tip[here]) < (3 * b.radius) ** 2
+        for way in range(WAYS):
+            node = found[int(NEAR * np.random.random() ** 2)]
+            if node < 0:
+                node = found[0]
+            if way == 0 and close:
+                node = here  # from where it stands it need not go anywhere first
+            corners(t.x[node], b.h, b.tool, c)
+            for r in range(3):
+                n[0, r] = (c[6, r] - c[5, r]) / (2 * b.h)
+                m[0, r] = (c[4, r] - c[3, r]) / (2 * b.h)
+            spread = 0.5 * np.random.random() ** 2
+            tilted(n[0].copy(), spread, n[0])
+            tilted(m[0].copy(), spread, m[0])
+            if not tool_posture(b, p, n, m, x):
                 continue
-        else:
-            visit(t, add_node(t, b, node, x))
-        made += 1
-        tries[pick] = 0
+            freed, roomed = s.used[0], s.used[1]
+            _, share = drive_far(s, b, t.x[node], x, t.size[1], why)
+            gained = s.used[0] - freed
+            if gained < least:
+                roll_back(s, freed, roomed)
+                continue
+            for r in range(7):
+                x[r] = t.x[node, r] + share * (x[r] - t.x[node, r])
+            if moving:
+                roll_back(s, freed, roomed)
+                if extend(s, b, t, node, x, why) < 0:
+                    continue
+            else:
+                visit(t, add_node(t, b, node, x))
+            made += 1
+            tries[pick] = 0
+            break
     return made

@@ -3,7 +3,8 @@
 Space only grows, so a procedure that is feasible stays so, and a greedy choice can
 waste procedures but never lose tissue. The entry is driven in passes of growing
 bend: the pilot makes the room in which the next pass may bend. Then come the
-procedures that gain most among random ones, and at last single steps, lump by lump.
+procedures that gain most among random ones, and at last single steps, lump by lump:
+first those that gain much, then those that gain little.
 """
 
 from collections.abc import Callable
@@ -27,6 +28,12 @@ from systems.resection.sweep import (
 )
 from systems.resection.tree import extend, nearest_nodes
 
+TURNS = 5
+"""Turns of a candidate's axis that are tried, each half the one before."""
+
+WEARY = 100
+"""Failed attempts after which a round asks for a voxel no more."""
+
 
 @dataclass
 class PlannerParams:
@@ -42,7 +49,11 @@ class PlannerParams:
         least_gain: Of a procedure, as a share of the reachable part; below it the
             finisher takes over.
         lump: How far, in m, the finisher looks from where it starts a lump.
-        step_gain: Tumour that a step of the finisher must free, in m3.
+        step_gains: Tumour that a step of the finisher must free, in m3, stage by
+            stage.
+        rounds: Through all lumps in a stage but the last, which goes on.
+        attempts: Of steps in a lump before the finisher looks at what they gained;
+            four times as many in the last stage.
         time_limit: After which the finisher ends, in s.
         seed: Of all random choices.
     """
@@ -55,9 +66,13 @@ class PlannerParams:
     )
     candidates: int = 32
     lengths: list[float] = field(default_factory=lambda: [0.0, 0.006, 0.012])
-    least_gain: float = 0.005
-    lump: float = 0.008
-    step_gain: float = 0.6e-9
+    least_gain: float = 0.01
+    lump: float = 0.006
+    step_gains: list[float] = field(
+        default_factory=lambda: [27e-9, 9e-9, 3e-9, 0.6e-9, 0.25e-9]
+    )
+    rounds: int = 4
+    attempts: int = 400
     time_limit: float = 120.0
     seed: int = 1
 
@@ -74,6 +89,12 @@ class PlannerParams:
             raise ValueError(
                 "planner.candidates and planner.lengths: expected at least one each"
             )
+        if not self.step_gains or min(self.step_gains) < 0.0:
+            raise ValueError(
+                f"planner.step_gains={self.step_gains} m3: expected at least one, >= 0"
+            )
+        if self.rounds < 1 or self.attempts < 1:
+            raise ValueError("planner.rounds and planner.attempts: expected at least 1")
         if not all(0.0 < bend <= math.pi / 4 + 1e-9 for bend in self.passes):
             raise ValueError(f"planner.passes={self.passes} rad: expected 0 to pi/4")
 
@@ -122,12 +143,20 @@ class Planner:
         while self.share < self.params.target and self.choose():
             self.progress(self.share)
         self.deadline = perf_counter() + self.params.time_limit
-        while self.share < self.params.target and perf_counter() < self.deadline:
-            if not self.finish():
-                break
-            self.progress(self.share)
+        for stage, gain in enumerate(self.params.step_gains):
+            last = stage + 1 == len(self.params.step_gains)
+            rounds = 0
+            while (last or rounds < self.params.rounds) and self.unfinished():
+                if not self.finish(gain, self.params.attempts * (4 if last else 1)):
+                    break
+                rounds += 1
+                self.progress(self.share)
         if self.session.steps and self.session.steps[-1].kind != "home":
             self.session.go_home()
+
+    def unfinished(self) -> bool:
+        """Whether the target is not reached, and there is time."""
+        return self.share < self.params.target and perf_counter() < self.deadline
 
     def _radius(self, bend: float) -> float:
         params = self.session.params
@@ -167,20 +196,25 @@ class Planner:
             p = session.volume.centre_of(int(left[self.rng.integers(len(left))]))
             nearest_nodes(t, p[0], p[1], p[2], found, far)
             node = int(found[self.rng.integers(16)])
-            x = np.empty(7)
-            if node < 0 or not straightened(b, t.x[node], p, self.rng.random(), x):
+            if node < 0:
                 continue
             length = float(self.rng.choice(params.lengths))
-            pitch = params.trial_pitch
-            gain = try_procedure(
-                s, b, t, node, x, length, pitch, math.pi / 4, pitch, why
-            )
+            pitch, share, gain = params.trial_pitch, self.rng.random(), -1
+            for _ in range(TURNS):
+                x = np.empty(7)
+                if straightened(b, t.x[node], p, share, x):
+                    gain = try_procedure(
+                        s, b, t, node, x, length, pitch, math.pi / 4, pitch, why
+                    )
+                if gain >= 0:
+                    break
+                share /= 2  # where it is tight the axis turns but little
             if gain > best[0]:
                 best = (gain, node, x, length)
         gain, node, x, length = best
         if gain < params.least_gain * len(self.goal):
             return False
-        before = session._standing()
+        before = session.standing()
         p_I, n = np.empty(3), np.empty(3)
         intermediate(b, x, p_I, n)
         if extend(s, b, t, node, x, why) < 0:
@@ -196,39 +230,40 @@ class Planner:
         session.record(f"procedure {number}", ELEMENTARY, before, procedure)
         return True
 
-    def finish(self) -> bool:
-        """Single steps in the lumps that are left, nearest first; False if vain."""
+    def finish(self, gain: float, attempts: int) -> bool:
+        """Single steps in the lumps that are left, nearest first; False if vain.
+
+        Args:
+            gain: Tumour that a step must free, in m3.
+            attempts: In a lump before it is looked at what they gained.
+        """
         session, params = self.session, self.params
         session.volume.forget_journals()
         session.make_room()
-        before = session._standing()
+        before = session.standing()
         volume = session.volume
         s, b, t, why = volume.space(), session.body, session.tree, session.why
-        least = max(1, round(params.step_gain / volume.voxel))
+        least = max(1, round(gain / volume.voxel))
         left = self.left()
         size = np.array(volume.labels.shape)
         points = np.column_stack(np.unravel_index(left, size)) * volume.spacing
         open_ = np.ones(len(left), bool)
         made = 0
-        while open_.any() and perf_counter() < self.deadline:
-            tip = t.tip[t.route[t.size[1] - 1]] - volume.origin
+        while open_.any() and self.unfinished() and session.roomy():
+            tip = session.tips[-1] - volume.origin
             rest = np.flatnonzero(open_)
             seed = rest[int(np.argmin(((points[rest] - tip) ** 2).sum(axis=1)))]
             near = ((points - points[seed]) ** 2).sum(axis=1) < params.lump**2
             lump = left[near & open_]
             open_ &= ~near
             tries = np.zeros(len(lump), np.int32)
-            for _ in range(8):
-                done = grow(
-                    s, b, t, lump, tries, 20 * len(lump) + 200, least, True, why
-                )
+            while len(lump) and session.roomy():
+                done = grow(s, b, t, lump, tries, attempts, WEARY, least, True, why)
                 made += done
-                alive = (s.tau[lump] == SOLID) & (tries < 100)
+                alive = (s.tau[lump] == SOLID) & (tries < WEARY)
                 lump, tries = lump[alive], tries[alive]
-                if done == 0 or len(lump) == 0:
+                if done < 2:
                     break
-            if self.share >= params.target or t.size[0] + 20_000 > len(t.x):
-                break
         if made:
             number = 1 + sum(step.kind == "finish" for step in session.steps)
             session.record(f"finish {number}", "finish", before)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from systems.resection.growth import TRIES, grow, seed_random, tilted, tool_posture
+from systems.resection.growth import grow, seed_random, tilted, tool_posture
 from systems.resection.session import Session
 from systems.resection.snake_body import OK, body_of, check_body, corners
 from systems.resection.space import FREE, SOLID, first_forbidden
@@ -26,6 +26,9 @@ from systems.resection.volume import CRITICAL, NAMES, TUMOUR, Volume
 
 ROUND = 20_000
 """Attempts between two looks at what is left."""
+
+WEARY = 250
+"""Failed attempts after which a voxel is asked for no more, at effort 1."""
 
 STALL = 0.001
 """A search whose last rounds gain less of the tumour than this has ended."""
@@ -86,12 +89,12 @@ def find_reach(
     wanted = np.flatnonzero(tumour & opening).astype(np.int32)
     tries = np.zeros(len(wanted), np.int32)
     total = int(np.count_nonzero(tumour))
-    patience = max(1, round(4 * effort))
+    patience, weary = max(1, round(4 * effort)), max(1, round(WEARY * effort))
     history = [0]
     while len(wanted):
         tree = grown(tree, ROUND, ROUND)
-        grow(s, body, tree, wanted, tries, ROUND, 3, False, why)
-        left = (s.tau[wanted] == SOLID) & (tries < TRIES * effort)
+        grow(s, body, tree, wanted, tries, ROUND, weary, 3, False, why)
+        left = (s.tau[wanted] == SOLID) & (tries < weary)
         wanted, tries = wanted[left], tries[left]
         history.append(int(s.used[0]))
         if len(history) > 2 * patience:

@@ -113,7 +113,7 @@ class Session:
 
     def commit(self, procedure: Procedure) -> Answer:
         """Makes a procedure part of the plan if it is feasible."""
-        before = self._standing()
+        before = self.standing()
         answer = self._do(procedure)
         if answer.feasible and procedure.tool is not None:
             answer = refused(
@@ -141,7 +141,7 @@ class Session:
 
     # How it is done ----------------------------------------------------------
 
-    def _standing(self) -> tuple[int, int, int]:
+    def standing(self) -> tuple[int, int, int]:
         """Nodes, visits and resected voxels: how things stand."""
         return (
             int(self.tree.size[0]),
@@ -156,6 +156,13 @@ class Session:
     def make_room(self) -> None:
         """Sees to it that a step's nodes fit into the tree."""
         self.tree = grown(self.tree, ROOM, 4 * ROOM)
+
+    def roomy(self) -> bool:
+        """Whether a third of that room is left."""
+        tree = self.tree
+        return bool(tree.size[0] + ROOM // 3 < len(tree.x)) and bool(
+            tree.size[1] + 4 * ROOM // 3 < len(tree.route)
+        )
 
     def _do(self, procedure: Procedure) -> Answer:
         """Carries a procedure out in thought; `_mark` is how it was before."""
@@ -251,7 +258,7 @@ class Session:
 
     def go_home(self) -> None:
         """Appends the way back into the channel."""
-        before = self._standing()
+        before = self.standing()
         self.make_room()
         go_to(self.volume.space(), self.body, self.tree, 0, self.why)
         self.record("home", "home", before)

@@ -228,6 +228,33 @@ def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
 
 
 @compiled
+def count_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
+    """How many voxels of a ball are still solid; it must lie within the grid."""
+    u = (x - s.origin[0]) / s.spacing
+    v = (y - s.origin[1]) / s.spacing
+    w = (z - s.origin[2]) / s.spacing
+    r = rho / s.spacing
+    _, ny, nz = s.size
+    rr = r * r
+    count = 0
+    for a in range(math.ceil(u - r), math.floor(u + r) + 1):
+        left = rr - (a - u) ** 2
+        if left < 0.0:
+            continue
+        across = math.sqrt(left)
+        for b in range(math.ceil(v - across), math.floor(v + across) + 1):
+            rest = left - (b - v) ** 2
+            if rest < 0.0:
+                continue
+            half = math.sqrt(rest)
+            row = (a * ny + b) * nz
+            for c in range(row + math.ceil(w - half), row + math.floor(w + half) + 1):
+                if s.tau[c] == SOLID:
+                    count += 1
+    return count
+
+
+@compiled
 def stamp(s: Any, x: float, y: float, z: float, rho: float, time: int) -> None:
     """Frees what of a ball is still solid, at a time."""
     u = (x - s.origin[0]) / s.spacing

@@ -142,7 +142,7 @@ def go_to(s: Any, b: Any, t: Any, node: int, why: Any) -> None:
     # Shorten: from each node straight to one farther on where that is free.
     at = 0
     while at < count:
-        jump = min(count - at, 64)
+        jump = count - at
         while jump > 1:
             if drive(s, b, t.x[way[at]], t.x[way[at + jump]], t.size[1], why) == OK:
                 break

@@ -8,7 +8,9 @@ from systems.resection.feasibility_map import feasibility_map
 from systems.resection.planner import Planner, PlannerParams
 from systems.resection.reach import find_reach
 from systems.resection.resection_ik import from_universal
+from systems.resection.snake_body import body_of
 from systems.resection.space import SOLID
+from systems.resection.tissue_carver import Carving
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,19 @@ def test_plan_is_free_by_an_independent_check(planned):
         for ball in c[:6]:
             body = np.linalg.norm(points - ball, axis=1) <= session.params.body_radius
             assert (tau[body] <= time).all()
+
+
+def test_nothing_stands_out_between_the_checks(planned):
+    """Carved ten times finer than it was checked, tool 0.05 mm smaller, body wider."""
+    session, _ = planned
+    carving = Carving(session.volume, session.params)
+    carving.body = body_of(session.params, clearance=0.03e-3)._replace(
+        radius=session.params.tool_radius - 0.05e-3
+    )
+    x = session.postures
+    for index in range(len(x) - 1):
+        _, _, hits, _ = carving.move(index, x[index], x[index + 1], 0.1e-3)
+        assert hits == 0, f"on the way to posture {index + 1}"
 
 
 def test_same_seed_same_plan(ball_session, planned):
