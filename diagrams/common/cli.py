@@ -1,13 +1,12 @@
 """The command line: `trocar`, or `python -m diagrams`."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 import logging
 from pathlib import Path
 import sys
 
-from tqdm import tqdm
-
+from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import (
     ScenarioError,
     load_scenario,
@@ -94,21 +93,6 @@ def default_name(name: str) -> str:
     return path.stem
 
 
-def make_progress(duration: float) -> tuple[Callable[[float], None], tqdm]:
-    """A progress bar on a terminal's standard error; silent in a pipe."""
-    bar = tqdm(
-        total=round(duration, 3),
-        unit="s",
-        disable=not sys.stderr.isatty(),
-        bar_format="{l_bar}{bar}| {n:.1f}/{total:.1f} simulated s [{elapsed}]",
-    )
-
-    def advance(time: float) -> None:
-        bar.update(time - bar.n)
-
-    return advance, bar
-
-
 def run_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar run`."""
     from diagrams.common.metrics import table
@@ -118,8 +102,7 @@ def run_command(arguments: argparse.Namespace) -> int:
         arguments.name, arguments.overrides, arguments.seed, arguments.duration
     )
     out = arguments.out or Path("out") / default_name(arguments.name)
-    progress, bar = make_progress(scenario.duration)
-    with bar:
+    with progress_bar("running", "simulated s") as progress:
         run = run_scenario(scenario, out, not arguments.no_replay, progress)
     if run.metrics:
         print(table(run.metrics))

@@ -34,6 +34,9 @@ INTEGRATOR = SimulatorConfig(
 )
 """All plants are continuous and stepped by CENIC."""
 
+Progress = Callable[[float, float], None]
+"""Called with simulated seconds: those done and all."""
+
 
 @dataclass
 class Run:
@@ -101,7 +104,7 @@ def rehearse(
 def simulate(
     scenario: Any,
     meshcat: Any = None,
-    progress: Callable[[float], None] = lambda time: None,
+    progress: Progress = lambda time, duration: None,
 ) -> Run:
     """Runs a scenario and returns its log; raises nothing that a run can survive.
 
@@ -112,7 +115,8 @@ def simulate(
         scenario: A study's scenario.
         meshcat: Records into this Meshcat if given. Frames are drawn between the
             timed advances, so that they do not count as simulation time.
-        progress: Called with the simulated time [s] after every frame.
+        progress: Called after every frame with the simulated time and that of the
+            whole run [s].
 
     Raises:
         ScenarioError: If the scenario cannot run.
@@ -125,7 +129,7 @@ def simulate_diagram(
     scenario: Any,
     diagram: Any,
     meshcat: Any = None,
-    progress: Callable[[float], None] = lambda time: None,
+    progress: Progress = lambda time, duration: None,
 ) -> Run:
     """Runs a diagram of one's own making, for example with swapped blocks.
 
@@ -162,6 +166,10 @@ def simulate_diagram(
     finally:
         gc.enable()
     run.simulated = context.get_time()
+    try:
+        study.keep(scenario, station, context, True)
+    except OSError as error:
+        run.error = run.error or f"what was done could not be saved: {error}"
     run.signals = read_log(sink, study, ports, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
@@ -187,7 +195,7 @@ def advance(
     run: Run,
     simulator: Any,
     recorder: replay.Recorder,
-    progress: Callable[[float], None],
+    progress: Progress,
 ) -> None:
     """Steps the simulator from frame to frame; only the steps are timed."""
     duration, period = run.duration, run.replay_speed / run.study.frame_rate
@@ -203,7 +211,8 @@ def advance(
         simulator.AdvanceTo(time)
         run.wall_time += perf_counter() - start
         recorder.draw(simulator.get_context())
-        progress(time)
+        progress(time, duration)
+        run.study.keep(run.scenario, station, simulator.get_context(), False)
 
 
 def logged_ports(station: Any, study: Study) -> list[str]:
@@ -269,7 +278,7 @@ def run_scenario(
     scenario: Any,
     out: Path,
     with_replay: bool = True,
-    progress: Callable[[float], None] = lambda time: None,
+    progress: Progress = lambda time, duration: None,
 ) -> Run:
     """Runs a scenario and writes all its results into a folder.
 

@@ -52,6 +52,8 @@ class Study:
         view: The replay's camera.
         adjust: Called with scenario, diagram and root context before every frame,
             for parameters of the plant that change with time.
+        keep: Called with scenario, diagram, root context and whether the run has
+            ended, after every frame: saves what must not be lost if it is killed.
         frame_rate: Frames of the replay per second of it [1/s].
         length: How long a scenario really runs [s], at most its duration.
         replay_length: A run longer than this [s] is shown faster.
@@ -69,6 +71,7 @@ class Study:
     controller: str = ""
     optional: frozenset[str] = frozenset()
     adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
+    keep: Callable[[Any, Any, Any, bool], None] = lambda *now: None
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], Any] = lambda scenario: None
     view: View = field(default_factory=View)

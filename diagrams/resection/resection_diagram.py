@@ -9,7 +9,11 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.wiring import connect, export, swap
-from diagrams.resection.resection_scenario import ResectionScenario, plan_operation
+from diagrams.resection.resection_scenario import (
+    ResectionScenario,
+    executed,
+    plan_operation,
+)
 from diagrams.resection.snake_diagram import DRUM_WIRES, WIRES
 from plants.snake.looks import draw_channel
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
@@ -45,6 +49,7 @@ EXPORTS = {
     "tissue.index": "tissue_carver.index",
     "tissue.removed": "tissue_carver.removed",
     "tissue.touched": "tissue_carver.touched",
+    "tissue.way": "tissue_carver.way",
     "watch.alarm": "wire_watch.alarm",
     "scene_graph.query": "scene_graph.query",
 }
@@ -54,12 +59,12 @@ def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s = scenario
     session = plan_operation(s).session
-    postures = session.postures
-    start = from_universal(postures[0].tolist())
+    postures, done = session.postures, executed(s)
+    start = from_universal(postures[done.posture].tolist())
     lengths = wound_lengths(start, s.inverse_actuation, s.snake)
     return {
         "procedure_player": ProcedurePlayer(
-            replace(s.player, lead=s.period), s.snake, postures
+            replace(s.player, lead=s.period), s.snake, postures, done.posture
         ),
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, start
@@ -73,7 +78,7 @@ def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
         "tissue_carver": TissueCarver(
             replace(s.carver, period=s.period),
             s.snake,
-            Carving(session.volume, s.snake),
+            Carving(session.volume, s.snake, done),
             start,
         ),
     }
@@ -100,7 +105,7 @@ def make_resection_diagram(
     snake = add_snake(plant, plant.world_frame(), scenario.snake, scenario.drive)
     draw_channel(plant, plant.world_body(), session.volume.channel)
     plant.Finalize()
-    near = session.postures[0]
+    near = session.postures[executed(scenario).posture]
     start = np.zeros(POSITIONS)
     start[NEAR], start[FAR] = near, near[1:]
     plant.SetDefaultPositions(snake.instance, start)

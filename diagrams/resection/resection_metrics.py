@@ -34,7 +34,6 @@ def measure(run: Any) -> dict[str, Any]:
     hits, nearest = run.matrix("tissue.touched")[-1]
     tool, reference = run.matrix("snake.tool"), run.matrix("tip.reference")
     error = np.linalg.norm(tool[:, :3] - reference[:, :3], axis=1)
-    moved = np.linalg.norm(np.diff(tool[:, :3], axis=0), axis=1)
     volume = session.volume.tumour_volume
     steps = session.steps
     cap = int(np.count_nonzero(session.volume.labels == 3)) * session.volume.voxel
@@ -52,8 +51,9 @@ def measure(run: Any) -> dict[str, Any]:
         "finishes": sum(step.kind == "finish" for step in steps),
         "planning_time": operation.planning_time,
         "reach_time": reach.time,
-        "execution_time": run.simulated,
-        "path_length": float(moved.sum()),
+        "execution_time": carving_of(run).done.time + run.simulated,
+        "resumed_at": carving_of(run).done.time,
+        "path_length": float(run.signals["tissue.way"][-1]),
         "max_tool_error": float(error.max()),
         "rms_tool_error": float(np.sqrt(np.mean(error**2))),
         "refusals": operation.refusals,

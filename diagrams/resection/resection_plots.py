@@ -141,20 +141,23 @@ def report(run: Any) -> Figure:
 
 
 def _timeline(axes: Any, run: Any, session: Any) -> None:
-    time = run.signals["time"]
+    before = carving_of(run).done.time  # what an earlier run carried out
+    time = before + run.signals["time"]
     share = run.signals["tissue.removed.tumour"] / session.volume.tumour_volume
     axes.plot(time / 60, 100 * share, color=COLORS["robot"], lw=1.6)
     reach = 100 * plan_operation(run.scenario).reach.fraction
     axes.axhline(reach, color=COLORS["target"], lw=1.0, ls="--")
     station = run.diagram.GetSubsystemByName("station")
-    times = station.GetSubsystemByName("procedure_player").times / 60
+    times = (before + station.GetSubsystemByName("procedure_player").times) / 60
     axes.set(
         xlabel="time [min]",
         ylabel="resected [%]",
         ylim=(0, 105),
-        xlim=(0, time[-1] / 60),
+        xlim=(before / 60, time[-1] / 60),
     )
-    axes.text(0.0, reach + 0.8, " reachable", color=COLORS["target"], fontsize=8)
+    axes.text(
+        before / 60, reach + 0.8, " reachable", color=COLORS["target"], fontsize=8
+    )
     axes.grid(alpha=0.3)
     for number, step in enumerate(session.steps):
         if step.kind == "home":

@@ -36,8 +36,9 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The tumour in blocks whose visibility is animated, the vessel, Figure 7."""
     operation = plan_operation(run.scenario)
     volume = operation.session.volume
-    tau = carving_of(run).volume.tau
-    last = float(run.signals["tissue.index"][-1])
+    carving = carving_of(run)
+    tau, first = carving.volume.tau, carving.done.index
+    moves = float(run.signals["tissue.index"][-1]) - first
     end = float(run.signals["time"][-1]) / run.replay_speed
     every = shown_spacing(volume)
     spacing = every * volume.spacing
@@ -45,7 +46,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     tissue = np.isin(volume.labels, (TUMOUR, CAP))
     shown: dict[tuple[int, ...], tuple[bytes, str]] = {}
     for number, share in enumerate(stages):
-        gone = (tau <= share * last) & (tau != SOLID)
+        gone = (tau <= first + share * moves) & (tau != SOLID)
         vertices, faces = surface(coarse(tissue & ~gone, every), volume.origin, spacing)
         blocks = _in_blocks(vertices, faces)
         frame = animation.frame(share * end)
@@ -126,6 +127,8 @@ def _elementary_volumes(meshcat: Any, animation: Any, run: Any, operation: Any) 
     for number, step in enumerate(session.steps):
         if step.kind not in ("elementary", "volume") or step.procedure is None:
             continue
+        if step.last <= carving_of(run).done.posture:
+            continue  # carried out before this run
         n = step.procedure.axis()
         ahead = params.straight_module + params.tool_offset
         p_WI = np.array(step.procedure.position) - ahead * n

@@ -9,14 +9,17 @@ from typing import Any
 
 from pydrake.common.yaml import yaml_dump_typed
 
+from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import Scenario, ScenarioError
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from systems.resection.access import propose_access
+from systems.resection.archive import beside
+from systems.resection.execution import Execution, load_execution
 from systems.resection.planner import Planner, PlannerParams
 from systems.resection.procedure import Procedure
 from systems.resection.procedure_player import ProcedurePlayerParams, schedule
-from systems.resection.reach import Reach, find_reach
+from systems.resection.reach import Reach, find_reach, load_reach, save_reach
 from systems.resection.resection_ik import ResectionIkParams
 from systems.resection.session import Session, load_session
 from systems.resection.space import NEIGHBOUR
@@ -74,7 +77,8 @@ class ResectionScenario(Scenario):
         automatic: Whether the planner goes on after them.
         planner: How.
         reach_effort: Scales how long the reachable part is searched.
-        session: A session's file to save to, and to resume from; none if empty.
+        session: A session's file to save plan and execution to, and to resume both
+            from after the program was killed; none if empty.
         period: Of drums and inverse kinematics in s, and CENIC's longest step.
     """
 
@@ -124,9 +128,9 @@ class Operation:
     planning_time: float
     name: str
 
-    def duration(self, player: ProcedurePlayerParams) -> float:
-        """Simulated time in s that carrying it out takes."""
-        return float(schedule(self.session.postures, player)[-1]) + player.dwell
+    def duration(self, player: ProcedurePlayerParams, first: int = 0) -> float:
+        """Simulated time in s that carrying it out takes from a posture on."""
+        return float(schedule(self.session.postures[first:], player)[-1]) + player.dwell
 
 
 def check(scenario: ResectionScenario) -> None:
@@ -223,7 +227,7 @@ def _planned(text: str, holder: _Holder) -> Operation:
         ):
             raise ScenarioError(f"session {str(file)!r} is of another tumour or access")
     session.file = file
-    reach = find_reach(session, scenario.seed, scenario.reach_effort)
+    reach = _reach(session, scenario, file)
     start = perf_counter()
     refusals = []
     for number, procedure in enumerate(scenario.procedures):
@@ -241,14 +245,51 @@ def _planned(text: str, holder: _Holder) -> Operation:
                 }
             )
     if scenario.automatic:
-        Planner(session, reach.mask, scenario.planner).run()
+        with progress_bar("planning", "of what can be reached") as progress:
+            Planner(
+                session,
+                reach.mask,
+                scenario.planner,
+                lambda share: progress(share, scenario.planner.target),
+            ).run()
     elif session.steps and session.steps[-1].kind != "home":
         session.go_home()
     return Operation(session, reach, refusals, perf_counter() - start, name)
 
 
+def _reach(session: Session, scenario: ResectionScenario, file: Path | None) -> Reach:
+    """The reachable part, from beside the session's file if it was found before."""
+    seed, effort = scenario.seed, scenario.reach_effort
+    if file is not None:
+        saved = load_reach(beside(file, "reach"), session, seed, effort)
+        if saved is not None:
+            return saved
+    with progress_bar("what can be reached", "of the tumour") as progress:
+        reach = find_reach(
+            session, seed, effort, progress=lambda share: progress(share, 1.0)
+        )
+    if file is not None:
+        save_reach(beside(file, "reach"), reach, session, seed, effort)
+    return reach
+
+
+def executed(scenario: ResectionScenario) -> Execution:
+    """What has been carried out of a scenario's plan, by its session's files.
+
+    Raises:
+        ScenarioError: If the file is damaged, or of another plan.
+    """
+    if not scenario.session:
+        return Execution()
+    file = beside(Path(scenario.session), "executed")
+    try:
+        return load_execution(file, plan_operation(scenario).session.postures)
+    except ValueError as error:
+        raise ScenarioError(str(error)) from error
+
+
 def length(scenario: ResectionScenario) -> float:
     """How long the run takes in s."""
     player = replace(scenario.player, lead=scenario.period)
-    needed = plan_operation(scenario).duration(player)
+    needed = plan_operation(scenario).duration(player, executed(scenario).posture)
     return min(scenario.duration, math.ceil(needed / LOG_PERIOD) * LOG_PERIOD)

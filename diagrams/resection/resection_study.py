@@ -1,5 +1,9 @@
 """The resection as a study: what is logged, measured, plotted and shown."""
 
+from pathlib import Path
+from time import time
+from typing import Any
+
 from pydrake.systems.analysis import SimulatorConfig
 
 from diagrams.common.study import Study, View
@@ -12,7 +16,10 @@ from diagrams.resection.resection_scenario import (
     ResectionScenario,
     check,
     length,
+    plan_operation,
 )
+from systems.resection.archive import beside
+from systems.resection.execution import save_execution
 
 XYZ = ("x", "y", "z")
 TOOL = (*XYZ, "n_x", "n_y", "n_z")
@@ -26,8 +33,29 @@ SIGNALS = {
     "tissue.index": ("index",),
     "tissue.removed": ("tumour", "healthy"),
     "tissue.touched": ("hits", "critical_distance"),
+    "tissue.way": ("length",),
     "watch.alarm": ("time", "module"),
 }
+
+
+SAVE_EVERY = 5.0
+"""Least wall time in s between two savings of what has been carried out."""
+
+
+def keep(scenario: ResectionScenario, station: Any, context: Any, ended: bool) -> None:
+    """Saves what has been carried out, beside the session's file if it has one."""
+    if not scenario.session:
+        return
+    file = beside(Path(scenario.session), "executed")
+    if not ended and file.is_file() and time() - file.stat().st_mtime < SAVE_EVERY:
+        return
+    player = station.GetSubsystemByName("procedure_player")
+    carver = station.GetSubsystemByName("tissue_carver")
+    posture = player.GetOutputPort("progress").Eval(
+        player.GetMyContextFromRoot(context)
+    )
+    done = carver.execution(carver.GetMyContextFromRoot(context), int(posture[0]))
+    save_execution(file, done, plan_operation(scenario).session.postures)
 
 
 def integrator(scenario: ResectionScenario) -> SimulatorConfig:
@@ -52,6 +80,7 @@ STUDY = Study(
     view=View(camera=(0.055, -0.075, 0.035), target=(0.0, 0.0, 0.014)),
     frame_rate=10.0,
     length=length,
+    keep=keep,
     replay_length=45.0,
 )
 """The resection of a tumour."""

@@ -136,10 +136,14 @@ class Planner:
         return 1.0 - len(self.left()) / max(len(self.goal), 1)
 
     def run(self) -> None:
-        """Plans to the target, or as far as it goes, and home."""
+        """Plans to the target, or as far as it goes, and home.
+
+        A session that was planned so before is left as it is.
+        """
+        if self.session.concluded == repr(self.params):
+            return
         seed_random(self.params.seed + len(self.session.steps))
-        if not any(step.kind == ENTRY for step in self.session.steps):
-            self.enter()
+        self.enter()
         while self.share < self.params.target and self.choose():
             self.progress(self.share)
         self.deadline = perf_counter() + self.params.time_limit
@@ -153,6 +157,8 @@ class Planner:
                 self.progress(self.share)
         if self.session.steps and self.session.steps[-1].kind != "home":
             self.session.go_home()
+        self.session.concluded = repr(self.params)
+        self.session.save_if_filed()
 
     def unfinished(self) -> bool:
         """Whether the target is not reached, and there is time."""
@@ -163,7 +169,7 @@ class Planner:
         return float(meridian(bend, params)[0]) + params.tool_radius
 
     def enter(self) -> None:
-        """The entry's passes, to the far end of the tumour."""
+        """The entry's passes, to the far end of the tumour, but those made before."""
         volume = self.session.volume
         deepest = float(volume.points(volume.labels == 1)[:, 2].max())
         length = deepest - volume.depth + self.session.params.tool_radius
@@ -171,16 +177,16 @@ class Planner:
         length = min(max(length, self.params.pitch), travel)
         for number, bend in enumerate(self.params.passes):
             name = "pilot entry" if number == 0 else f"entry {number + 1}"
-            self.session.commit(
-                Procedure(
-                    kind=ENTRY,
-                    length=length,
-                    radius=self._radius(bend),
-                    clipped=True,
-                    pitch=self.params.pitch,
-                    name=name,
-                )
+            procedure = Procedure(
+                kind=ENTRY,
+                length=length,
+                radius=self._radius(bend),
+                clipped=True,
+                pitch=self.params.pitch,
+                name=name,
             )
+            if not any(step.procedure == procedure for step in self.session.steps):
+                self.session.commit(procedure)
             self.progress(self.share)
 
     def choose(self) -> bool:

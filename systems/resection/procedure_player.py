@@ -79,8 +79,17 @@ class ProcedurePlayer(Block):
         params: ProcedurePlayerParams | None = None,
         snake: SnakeParams | None = None,
         postures: ArrayLike | None = None,
+        first: int = 0,
     ) -> None:
-        """Makes the block for postures (n, 7); a short bend if None."""
+        """Makes the block for a plan.
+
+        Args:
+            params: Rates.
+            snake: Geometry.
+            postures: As s, a1, b1, ..., b3, (n, 7); a short bend if None.
+            first: Index of the posture at which the robot stands: those before it
+                have been played.
+        """
         super().__init__()
         self._params = params or ProcedurePlayerParams()
         self._params.check()
@@ -92,6 +101,9 @@ class ProcedurePlayer(Block):
             raise ValueError(
                 f"postures have shape {self._x.shape}, expected (n, 7) with n > 0"
             )
+        if not 0 <= first < len(self._x):
+            raise ValueError(f"first={first}: expected 0 to {len(self._x) - 1}")
+        self._first, self._x = first, self._x[first:]
         self._times = schedule(self._x, self._params)
         ticket = {self.time_ticket()}
         self.vector_out("target", 9, self._calc_target, ticket)
@@ -105,8 +117,8 @@ class ProcedurePlayer(Block):
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """When each posture is reached in s, (n,)."""
-        return self._times
+        """When each posture is reached in s, (n,); 0 for those played before."""
+        return np.concatenate([np.zeros(self._first), self._times])
 
     def _pose(self, time: float) -> list[float]:
         """p_WT, n_WT, n_WI (9) at a time."""
@@ -130,4 +142,4 @@ class ProcedurePlayer(Block):
 
     def _calc_progress(self, context: Any) -> Sequence[float]:
         reached = int(np.searchsorted(self._times, context.get_time() + 1e-9, "right"))
-        return [float(max(reached - 1, 0))]
+        return [float(self._first + max(reached - 1, 0))]

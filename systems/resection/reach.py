@@ -10,13 +10,17 @@ reached. It ends when steps no longer gain anything; a longer search finds littl
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+import hashlib
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from systems.resection.archive import read_archive, write_archive
 from systems.resection.growth import grow, seed_random, tilted, tool_posture
 from systems.resection.session import Session
 from systems.resection.snake_body import OK, body_of, check_body, corners
@@ -69,7 +73,11 @@ class Reach:
 
 
 def find_reach(
-    session: Session, seed: int = 1, effort: float = 1.0, explain: bool = True
+    session: Session,
+    seed: int = 1,
+    effort: float = 1.0,
+    explain: bool = True,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> Reach:
     """Computes the reachable part of a session's tumour from its beginning.
 
@@ -78,6 +86,7 @@ def find_reach(
         seed: Of the random steps.
         effort: Scales how long a search without success goes on.
         explain: Whether to say why the rest is not reached.
+        progress: Called with the share of the tumour that is reached.
     """
     start = perf_counter()
     volume, body = session.volume.fresh(), body_of(session.params)
@@ -97,6 +106,7 @@ def find_reach(
         left = (s.tau[wanted] == SOLID) & (tries < weary)
         wanted, tries = wanted[left], tries[left]
         history.append(int(s.used[0]))
+        progress(history[-1] / total)
         if len(history) > 2 * patience:
             recent = history[-1] - history[-1 - patience]
             if recent < STALL * patience / 4 * total:
@@ -105,6 +115,37 @@ def find_reach(
     fraction = float(np.count_nonzero(mask)) / total
     lumps = _lumps(session, volume, opening.reshape(mask.shape)) if explain else []
     return Reach(mask, fraction, perf_counter() - start, int(tree.size[0]), lumps)
+
+
+def save_reach(
+    path: Path, reach: Reach, session: Session, seed: int, effort: float
+) -> None:
+    """Writes the reachable part, and what it was computed for."""
+    meta = {
+        "key": _key(session, seed, effort),
+        "fraction": reach.fraction,
+        "time": reach.time,
+        "steps": reach.steps,
+        "lumps": [asdict(lump) for lump in reach.lumps],
+    }
+    write_archive(path, meta, {"mask": reach.mask})
+
+
+def load_reach(path: Path, session: Session, seed: int, effort: float) -> Reach | None:
+    """The reachable part that was saved; None if there is none for this."""
+    try:
+        meta, arrays = read_archive(path, "reach")
+    except ValueError:
+        return None  # it can be computed again
+    if meta["key"] != _key(session, seed, effort):
+        return None
+    lumps = [Lump(**row) for row in meta["lumps"]]
+    return Reach(arrays["mask"], meta["fraction"], meta["time"], meta["steps"], lumps)
+
+
+def _key(session: Session, seed: int, effort: float) -> str:
+    labels = hashlib.sha256(session.volume.labels.tobytes()).hexdigest()
+    return f"{labels} {session.volume.margin} {session.params} {seed} {effort}"
 
 
 def _opening(volume: Volume, radius: float) -> NDArray[np.bool_]:

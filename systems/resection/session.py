@@ -1,10 +1,6 @@
 """A resection as a session: propose, check, preview, commit, undo, save, resume."""
 
 from dataclasses import asdict, dataclass, field
-import hashlib
-import io
-import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plants.snake.parameters import SnakeParams
+from systems.resection.archive import read_archive, write_archive
 from systems.resection.feasibility import (
     NEVER,
     Answer,
@@ -83,6 +80,7 @@ class Session:
             a ball that is smaller by this.
         steps: What has been committed.
         file: Where every commit is saved; nowhere if None.
+        concluded: How a planner went about it that found nothing more to do.
     """
 
     volume: Volume
@@ -91,6 +89,7 @@ class Session:
     accuracy: float = 0.05e-3
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
+    concluded: str = ""
 
     def __post_init__(self) -> None:
         self.params.check()
@@ -134,6 +133,7 @@ class Session:
         if not self.steps:
             raise ValueError("there is no step to undo")
         step = self.steps.pop()
+        self.concluded = ""
         self.volume.undo(step.first - 1)
         self.tree.size[:] = step.nodes, step.first
         self.save_if_filed()
@@ -253,6 +253,7 @@ class Session:
         )
         step = Step(name, kind, first, int(self.tree.size[1]), nodes, gained, procedure)
         self.steps.append(step)
+        self.concluded = ""
         self.save_if_filed()
         return step
 
@@ -312,28 +313,9 @@ class Session:
             "accuracy": self.accuracy,
             "params": asdict(self.params),
             "steps": [asdict(step) for step in self.steps],
+            "concluded": self.concluded,
         }
-        buffer = io.BytesIO()
-        np.savez_compressed(buffer, meta=np.array(json.dumps(meta)), **arrays)
-        content = buffer.getvalue()
-        digest = hashlib.sha256(content).digest()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = path.with_name(path.name + ".draft")
-        with draft.open("wb") as stream:
-            stream.write(MAGIC + digest + content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        if path.exists():
-            os.replace(path, before(path))
-        os.replace(draft, path)
-
-
-MAGIC = b"trocar-session-1"
-
-
-def before(path: Path) -> Path:
-    """Where the file before this one is kept."""
-    return path.with_name(path.name + ".before")
+        write_archive(path, meta, arrays)
 
 
 def load_session(path: Path) -> Session:
@@ -342,18 +324,7 @@ def load_session(path: Path) -> Session:
     Raises:
         ValueError: If the file is not there or damaged; the one before is offered.
     """
-    offer = ""
-    earlier = before(path)
-    if earlier.is_file() and _content(earlier) is not None:
-        offer = f"; the one before it is whole: {earlier}"
-    if not path.is_file():
-        raise ValueError(f"no session {str(path)!r}{offer}")
-    content = _content(path)
-    if content is None:
-        raise ValueError(f"session {str(path)!r} is damaged{offer}")
-    with np.load(io.BytesIO(content), allow_pickle=False) as data:
-        arrays = {name: data[name] for name in data.files}
-    meta = json.loads(str(arrays["meta"]))
+    meta, arrays = read_archive(path, "session")
     volume = Volume(
         arrays["labels"],
         arrays["origin"],
@@ -377,16 +348,9 @@ def load_session(path: Path) -> Session:
     for row in meta["steps"]:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))
+    session.concluded = meta["concluded"]
     session.file = path
     return session
-
-
-def _content(path: Path) -> bytes | None:
-    """What a session's file holds, or None if it is damaged."""
-    raw = path.read_bytes()
-    start = len(MAGIC) + 32
-    whole = raw[:start] == MAGIC + hashlib.sha256(raw[start:]).digest()
-    return raw[start:] if whole and len(raw) > start else None
 
 
 def home_posture(volume: Volume, params: SnakeParams) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
 from systems.common.compiled import compiled
+from systems.resection.execution import Execution
 from systems.resection.resection_ik import universal
 from systems.resection.snake_body import OK, body_of, check_body, corners
 from systems.resection.space import SOLID, Space, stamp
@@ -63,8 +64,9 @@ def carve(
         time: Arrival time of what is freed.
 
     Returns:
-        Tumour voxels and others freed, checks at which the body met tissue, and the
-        least distance in m of tool or body to what is critical.
+        Tumour voxels and others freed, checks at which the body met tissue, the
+        least distance in m of tool or body to what is critical, and the tool's way
+        in m.
     """
     c, x, why = np.empty((8, 3)), np.empty(7), np.empty(6)
     corners(x0, b.h, b.tool, c)
@@ -98,7 +100,7 @@ def carve(
                     q2 = c[link - 1, 2] + share * (c[link, 2] - c[link - 1, 2])
                     d = interpolated(s, critical, q0, q1, q2)
                     nearest = min(nearest, d - (b.radius if link == 7 else b.body))
-    return tumour, healthy, hits, nearest
+    return tumour, healthy, hits, nearest, way
 
 
 @compiled
@@ -130,24 +132,27 @@ class Carving:
     goes on from there.
     """
 
-    def __init__(self, volume: Volume, params: SnakeParams, start: int = 0) -> None:
+    def __init__(
+        self, volume: Volume, params: SnakeParams, done: Execution | None = None
+    ) -> None:
         """Makes the executed tissue.
 
         Args:
             volume: The planned volume; labels and grid are taken from it.
             params: The robot.
-            start: Index of the plan up to which tissue is gone already.
+            done: What has been carried out before.
         """
         self.volume = volume.fresh()
-        if start > 0:
-            self.volume.tau[volume.tau <= start] = 0
+        self.done = done or Execution()
+        if self.done.tau is not None:
+            self.volume.tau[:] = self.done.tau
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
         self.body = body_of(params)
         critical = (volume.labels == 4).any()
         distance = volume.distance_to_critical() if critical else np.empty(0)
         self.critical: NDArray[np.float64] = distance.reshape(-1)
-        self.latest = 0
+        self.latest = self.done.index
         self.space: Space = self.volume.space()
 
     def move(self, index: int, x0: Any, x1: Any, pitch: float) -> Any:
@@ -201,19 +206,41 @@ class TissueCarver(Block):
         self.carving = carving or Carving(_example_volume(), snake)
         self._voxel = self.carving.volume.voxel
         self._posture = self.vector_in("posture", [0.0] * 7)
-        self.state_out("index", [0.0])
-        self.state_out("removed", [0.0, 0.0])
-        self.state_out("touched", [0.0, -1.0])
+        done = self.carving.done
+        self.state_out("index", [done.index])
+        self.state_out("removed", done.removed)
+        self.state_out("touched", done.touched)
+        self.state_out("way", [done.way])
         self._at = self.DeclareDiscreteState(universal(posture))
         self.update_every(self._params.period, self._update)
 
+    def execution(self, context: Any, posture: int) -> Execution:
+        """What has been carried out by now.
+
+        Args:
+            context: The block's.
+            posture: Index of the plan's posture last reached.
+        """
+        index, removed, touched, way = (
+            context.get_discrete_state(group).value().tolist() for group in range(4)
+        )
+        return Execution(
+            posture,
+            self.carving.done.time + context.get_time(),
+            int(index[0]),
+            (removed[0], removed[1]),
+            (touched[0], touched[1]),
+            way[0],
+            self.carving.volume.tau,
+        )
+
     def _update(self, context: Any) -> Sequence[Sequence[float]]:
         state = [
-            context.get_discrete_state(group).value().tolist() for group in range(4)
+            context.get_discrete_state(group).value().tolist() for group in range(5)
         ]
-        index, removed, touched, x0 = state
+        index, removed, touched, way, x0 = state
         x1 = universal(self._posture.Eval(context).tolist())
-        tumour, healthy, hits, nearest = self.carving.move(
+        tumour, healthy, hits, nearest, moved = self.carving.move(
             int(index[0]), np.array(x0), np.array(x1), self._params.pitch
         )
         if math.isfinite(nearest):
@@ -225,6 +252,7 @@ class TissueCarver(Block):
             [index[0] + 1.0],
             [removed[0] + tumour * self._voxel, removed[1] + healthy * self._voxel],
             [touched[0] + hits, nearest],
+            [way[0] + moved],
             x1,
         )
 

@@ -1,13 +1,22 @@
 """Resections end to end."""
 
 import json
+import signal
+import subprocess
+import sys
+import time
 
+import numpy as np
 import pytest
 
 from diagrams.common.cli import main
 from diagrams.common.run import run_scenario, simulate
 from diagrams.common.scenario import ScenarioError, load_scenario
 from diagrams.resection.resection_scenario import plan_operation
+from systems.resection.archive import beside
+from systems.resection.execution import Execution, load_execution, save_execution
+from systems.resection.reach import load_reach
+from systems.resection.session import load_session
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +43,7 @@ def test_paper(paper):
 
 def test_carving_keeps_up(paper):
     run, _ = paper
-    assert run.metrics["real_time_factor"] >= 3.0  # 5 asked for; CI shares its cores
+    assert run.metrics["real_time_factor"] >= 5.0
 
 
 def test_refused():
@@ -135,3 +144,62 @@ def test_console(tmp_path, monkeypatch, capsys):
     assert "never freed" in out or "tool outside" in out
     assert "took back entry" in out and "undo" in out
     assert file.exists()
+
+
+COARSE = [
+    "spacing=0.001",
+    "reach_effort=0.25",
+    "tumour.lobes=0",
+    "planner.target=0.7",
+    "planner.candidates=4",
+]
+
+
+def test_execution_goes_on_after_being_killed(tmp_path):
+    """What a killed run had removed stays removed, and the next one does the rest."""
+    file = tmp_path / "s.session"
+    whole = simulate(load_scenario("resect_auto_small", COARSE))
+    command = [sys.executable, "-m", "diagrams", "run", "resect_auto_small"]
+    for override in [*COARSE, f"session={file}"]:
+        command += ["--set", override]
+    executed = beside(file, "executed")
+    with subprocess.Popen([*command, "--no-replay", "--out", tmp_path / "o"]) as child:
+        while child.poll() is None and not executed.is_file():
+            time.sleep(0.02)
+        child.kill()
+    assert child.returncode == -signal.SIGKILL
+    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
+    done = load_execution(executed, plan_operation(scenario).session.postures)
+    assert 0.0 < done.time < whole.metrics["execution_time"]
+    rest = simulate(scenario)
+    assert rest.metrics["resumed_at"] == done.time
+    for key in ("execution_time", "path_length", "resected_fraction"):
+        assert rest.metrics[key] == pytest.approx(whole.metrics[key], rel=0.02)
+    assert rest.metrics["body_collisions"] == 0
+    again = simulate(scenario)  # nothing is left to do
+    assert again.simulated < 1.5
+    assert again.metrics["resected_fraction"] == rest.metrics["resected_fraction"]
+
+
+def test_an_execution_of_another_plan_is_refused(tmp_path):
+    file = tmp_path / "s.session"
+    scenario = load_scenario("resect_paper", [f"session={file}", "reach_effort=0.05"])
+    postures = plan_operation(scenario).session.postures
+    done = Execution(posture=5, tau=np.zeros((2, 2, 2), np.int32))
+    save_execution(beside(file, "executed"), done, postures + 0.1)
+    with pytest.raises(ScenarioError, match="is of another plan: move it away"):
+        simulate(scenario)
+    beside(file, "executed").write_bytes(b"rubbish")
+    with pytest.raises(ScenarioError, match="is damaged"):
+        simulate(scenario)
+
+
+def test_the_reachable_part_is_searched_once(tmp_path):
+    file = tmp_path / "s.session"
+    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
+    reach = plan_operation(scenario).reach
+    session = load_session(file)
+    again = load_reach(beside(file, "reach"), session, 1, 0.25)
+    assert again is not None and again.lumps == reach.lumps
+    np.testing.assert_array_equal(again.mask, reach.mask)
+    assert load_reach(beside(file, "reach"), session, 2, 0.25) is None

@@ -56,7 +56,7 @@ def test_nothing_stands_out_between_the_checks(planned):
     )
     x = session.postures
     for index in range(len(x) - 1):
-        _, _, hits, _ = carving.move(index, x[index], x[index + 1], 0.1e-3)
+        hits = carving.move(index, x[index], x[index + 1], 0.1e-3)[2]
         assert hits == 0, f"on the way to posture {index + 1}"
 
 

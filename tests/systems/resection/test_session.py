@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from plants.snake.parameters import SnakeParams
+from systems.resection.archive import before
 from systems.resection.entry_law import least_clearance, least_radius, opening_ratio
 from systems.resection.procedure import (
     Procedure,
@@ -11,7 +12,7 @@ from systems.resection.procedure import (
     load_procedures,
     save_procedures,
 )
-from systems.resection.session import before, load_session
+from systems.resection.session import load_session
 from systems.resection.space import SOLID
 from systems.resection.volume import TUMOUR
 
