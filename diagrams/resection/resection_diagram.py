@@ -61,7 +61,7 @@ def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
     session = plan_operation(s).session
     postures, done = session.postures, executed(s)
     start = from_universal(postures[done.posture].tolist())
-    lengths = wound_lengths(start, s.inverse_actuation, s.snake)
+    lengths = wound_lengths(start, s.inverse_actuation, s.snake, s.drive)
     return {
         "procedure_player": ProcedurePlayer(
             replace(s.player, lead=s.period), s.snake, postures, done.posture
@@ -69,7 +69,9 @@ def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, start
         ),
-        "wire_inverse_actuation": WireInverseActuation(s.inverse_actuation, s.snake),
+        "wire_inverse_actuation": WireInverseActuation(
+            s.inverse_actuation, s.snake, s.drive
+        ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
         "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
         "snake_location": SnakeLocation(s.snake),

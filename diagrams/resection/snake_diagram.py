@@ -88,13 +88,13 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
     winding = s.inverse_actuation
     if elastic:
         winding = replace(winding, stiffness=s.drive.wire_stiffness)
-    lengths = wound_lengths(posture, winding, s.snake)
+    lengths = wound_lengths(posture, winding, s.snake, s.drive)
     blocks = {
         "tip_reference": TipReference(replace(s.tip, lead=s.period)),
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, posture
         ),
-        "wire_inverse_actuation": WireInverseActuation(winding, s.snake),
+        "wire_inverse_actuation": WireInverseActuation(winding, s.snake, s.drive),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
         "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
         "snake_location": SnakeLocation(s.snake),

@@ -161,21 +161,37 @@ def tips_of(procedure: Procedure, start: np.ndarray, params: SnakeParams) -> np.
     return (O2[:, None, :] + dome.reshape(-1, 3)).reshape(-1, 3)
 
 
+def plate_gap(p: np.ndarray, why: np.ndarray, face: float) -> float:
+    """How deep a point lies in the last plate, a cylinder, in m.
+
+    Args:
+        p: The point in W, (3,).
+        why: The culprit as `snake_body.check_body` leaves it, (9,).
+        face: Length of the cylinder in m.
+    """
+    away, n = p - why[1:4], why[6:9]
+    along = float(away @ n)
+    across = float(np.linalg.norm(away - along * n))
+    return max(min(float(why[4]) - across, face / 2 - abs(along)), 0.0)
+
+
 def explain(
     volume: Volume,
     status: int,
     why: np.ndarray,
     tips: np.ndarray,
     tool_radius: float,
+    face: float,
 ) -> Answer:
     """Names what a pose that failed met first.
 
     Args:
         volume: The volume as it was at that pose.
         status: BODY, TOOL or a limit.
-        why: The culprit as `snake_body.drive` leaves it, (6,).
+        why: The culprit as `snake_body.drive` leaves it, (9,).
         tips: Where the tool of the whole procedure goes, (n, 3).
         tool_radius: In m.
+        face: Length of the last plate with its half module, in m.
     """
     if status not in (BODY, TOOL):
         return refused(LIMIT, why[1:4], 0.0, f"beyond a limit at {place(why[1:4])}")
@@ -186,7 +202,8 @@ def explain(
     at = int(voxel) if voxel != OUTSIDE else int(why[5])
     gap = max(float(why[4]) - distance, 0.0) if math.isfinite(distance) else 0.0
     if PARTS[int(why[0])] == "the last plate":
-        gap = max(gap, volume.spacing / 2)  # at its edge no more is known
+        at = int(why[5])
+        gap = plate_gap(volume.centre_of(at), why, face) if at >= 0 else gap
     where = volume.centre_of(at) if at >= 0 else why[1:4]
     if at < 0 and where[2] <= volume.depth:
         gap = math.hypot(where[0], where[1]) + float(why[4]) - volume.channel

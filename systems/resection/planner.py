@@ -20,13 +20,11 @@ from systems.resection.growth import grow, seed_random
 from systems.resection.procedure import ELEMENTARY, ENTRY, Procedure
 from systems.resection.session import Session
 from systems.resection.space import SOLID
-from systems.resection.sweep import (
-    intermediate,
-    straightened,
-    sweep_procedure,
-    try_procedure,
-)
-from systems.resection.tree import extend, nearest_nodes
+from systems.resection.sweep import intermediate, straightened, try_procedure
+from systems.resection.tree import nearest_nodes
+
+NEAR = 16
+"""Nodes near a voxel among which a candidate's start is drawn."""
 
 TURNS = 5
 """Turns of a candidate's axis that are tried, each half the one before."""
@@ -189,25 +187,31 @@ class Planner:
                 self.session.commit(procedure)
             self.progress(self.share)
 
-    def choose(self) -> bool:
-        """Commits the best of some random procedures; False if none is worth it."""
+    def suggest(self) -> list[Procedure]:
+        """The procedures of some random ones that gain enough, best first.
+
+        Nothing changes: it is the surgeon's, or `choose`'s, to commit one.
+        """
         session, params = self.session, self.params
         session.volume.forget_journals()
         session.make_room()
         s, b, t, why = session.volume.space(), session.body, session.tree, session.why
         left = self.left()
-        found, far = np.empty(16, np.int64), np.empty(16)
-        best: tuple[int, int, NDArray, float] = (0, 0, np.empty(7), 0.0)
+        if len(left) == 0:
+            return []
+        found, far = np.empty(NEAR, np.int64), np.empty(NEAR)
+        least = params.least_gain * len(self.goal)
+        good: list[tuple[int, Procedure]] = []
         for _ in range(params.candidates):
             p = session.volume.centre_of(int(left[self.rng.integers(len(left))]))
             nearest_nodes(t, p[0], p[1], p[2], found, far)
-            node = int(found[self.rng.integers(16)])
+            node = int(found[self.rng.integers(NEAR)])
             if node < 0:
                 continue
             length = float(self.rng.choice(params.lengths))
             pitch, share, gain = params.trial_pitch, self.rng.random(), -1
+            x = np.empty(7)
             for _ in range(TURNS):
-                x = np.empty(7)
                 if straightened(b, t.x[node], p, share, x):
                     gain = try_procedure(
                         s, b, t, node, x, length, pitch, math.pi / 4, pitch, why
@@ -215,26 +219,32 @@ class Planner:
                 if gain >= 0:
                     break
                 share /= 2  # where it is tight the axis turns but little
-            if gain > best[0]:
-                best = (gain, node, x, length)
-        gain, node, x, length = best
-        if gain < params.least_gain * len(self.goal):
-            return False
-        before = session.standing()
-        p_I, n = np.empty(3), np.empty(3)
-        intermediate(b, x, p_I, n)
-        if extend(s, b, t, node, x, why) < 0:
-            return False
-        start = t.tip[t.route[t.size[1] - 1]].tolist()
-        pitch = params.pitch
-        bend = session.params.max_bend
-        sweep_procedure(s, b, t, n, length, pitch, bend, pitch, False, why)
-        number = 1 + sum(step.kind == ELEMENTARY for step in session.steps)
-        procedure = Procedure(
-            ELEMENTARY, start, n.tolist(), length, self._radius(bend), True, pitch
+            if gain > 0 and gain >= least:
+                good.append((gain, self._procedure(x, length)))
+        return [procedure for _, procedure in sorted(good, key=lambda row: -row[0])]
+
+    def _procedure(self, x: NDArray[np.float64], length: float) -> Procedure:
+        """The clipped procedure that starts at a posture (7,), last module straight."""
+        params = self.session.params
+        p_WI, n = np.empty(3), np.empty(3)
+        intermediate(self.session.body, x, p_WI, n)
+        start = p_WI + (params.straight_module + params.tool_offset) * n
+        radius = self._radius(params.max_bend)
+        number = 1 + sum(step.kind == ELEMENTARY for step in self.session.steps)
+        return Procedure(
+            ELEMENTARY,
+            start.tolist(),
+            n.tolist(),
+            length,
+            radius,
+            True,
+            self.params.pitch,
+            name=f"procedure {number}",
         )
-        session.record(f"procedure {number}", ELEMENTARY, before, procedure)
-        return True
+
+    def choose(self) -> bool:
+        """Commits the best that is suggested; False if nothing is."""
+        return any(self.session.commit(p).feasible for p in self.suggest())
 
     def finish(self, gain: float, attempts: int) -> bool:
         """Single steps in the lumps that are left, nearest first; False if vain.

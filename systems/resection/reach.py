@@ -23,7 +23,7 @@ from scipy import ndimage
 from systems.resection.archive import read_archive, write_archive
 from systems.resection.growth import grow, seed_random, tilted, tool_posture
 from systems.resection.session import Session
-from systems.resection.snake_body import OK, body_of, check_body, corners
+from systems.resection.snake_body import CULPRIT, OK, body_of, check_body, corners
 from systems.resection.space import FREE, SOLID, first_forbidden
 from systems.resection.tree import grown, new_tree
 from systems.resection.volume import CRITICAL, NAMES, TUMOUR, Volume
@@ -90,7 +90,7 @@ def find_reach(
     """
     start = perf_counter()
     volume, body = session.volume.fresh(), body_of(session.params)
-    s, why = volume.space(), np.zeros(6)
+    s, why = volume.space(), np.zeros(CULPRIT)
     seed_random(seed)
     tree = new_tree(session.home, session.tree.tip[0], ROUND, ROUND)
     tumour = (volume.labels == TUMOUR).reshape(-1)
@@ -197,7 +197,7 @@ def _reason(
         return "within the margin of what is critical"
     if narrow.sum() > 0.5 * mask.sum():
         return TOO_NARROW
-    body, s, why = body_of(session.params), volume.space(), np.zeros(6)
+    body, s, why = body_of(session.params), volume.space(), np.zeros(CULPRIT)
     rng = np.random.default_rng(1)
     blame: Counter[str] = Counter()
     p, n, m, x = np.empty((1, 3)), np.empty((1, 3)), np.empty((1, 3)), np.empty(7)

@@ -25,7 +25,7 @@ from systems.resection.procedure import (
     widest_bend,
     with_tool,
 )
-from systems.resection.snake_body import OK, Body, body_of, corners
+from systems.resection.snake_body import CULPRIT, OK, Body, body_of, corners
 from systems.resection.space import roll_back
 from systems.resection.sweep import LIMIT, posture_at, sweep_procedure
 from systems.resection.tree import (
@@ -85,8 +85,8 @@ class Session:
 
     volume: Volume
     params: SnakeParams
-    clearance: float = 0.13e-3
-    accuracy: float = 0.05e-3
+    clearance: float = 0.08e-3
+    accuracy: float = 0.03e-3
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
     concluded: str = ""
@@ -98,7 +98,7 @@ class Session:
         c = np.empty((8, 3))
         corners(self.home, self.body.h, self.body.tool, c)
         self.tree: Tree = new_tree(self.home, c[7], ROOM, ROOM)
-        self.why = np.zeros(6)
+        self.why = np.zeros(CULPRIT)
 
     # What is asked -----------------------------------------------------------
 
@@ -207,7 +207,9 @@ class Session:
         poses = int(self.tree.size[1]) - self._mark[3]
         gained = int(self.volume.space().used[0]) * self.volume.voxel
         if status != OK:
-            answer = explain(self.volume, status, self.why, tips, params.tool_radius)
+            answer = explain(
+                self.volume, status, self.why, tips, params.tool_radius, body.face
+            )
             answer.poses = poses
             return answer
         if procedure.clipped and gained == 0.0:

@@ -31,15 +31,19 @@ TOOL = 2  # the tool would leave what it may remove
 BEND = 3  # a bend beyond its limit
 TRAVEL = 4  # the translation beyond its travel
 
+CULPRIT = 9
+"""Numbers that name what a pose met: part, point, radius, voxel, axis of a plate."""
+
 SHANK = 1.2e-3
 """Radius of the tool's shank in m."""
 
-TOOL_SHARE, EDGE_SHARE = 2, 4
+TOOL_SHARE, EDGE_SHARE = 2, 8
 """How much oftener than the round body the tool and the last plate are checked.
 
 Halfway between two checks a round body stands out of where it was found to fit by
-0.03 mm, an edge by up to 0.7 of half the way: 0.09 mm at a quarter of 1 mm, which the
-plan's clearance covers; at half of it, it does not."""
+0.03 mm, an edge by up to 0.7 of half the way: 0.04 mm at an eighth of 1 mm. The
+plan's clearance covers that and the tracking's error.
+"""
 
 
 class Body(NamedTuple):
@@ -146,7 +150,7 @@ def _blame(
 
 @compiled
 def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
-    """OK or BODY for a body with corners c (8, 3); the culprit goes to why (6,).
+    """OK or BODY for a body with corners c (8, 3); the culprit goes to why (9,).
 
     Parts 0 to 5 are the links behind each ball (0 what lies in the channel), 6 the
     last plate's rim, 7 the shank. Those before `first` are taken for free.
@@ -177,6 +181,7 @@ def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
     at = plate_solid(s, x, y, z, n0, n1, n2, b.face, b.body)
     if at != FREE:
         half = b.face / 2
+        why[6], why[7], why[8] = n0, n1, n2
         return _blame(why, 6, x + half * n0, y + half * n1, z + half * n2, b.body, at)
     along = b.face
     while along < length - b.radius + b.shank:
@@ -215,7 +220,7 @@ def drive(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> int:
         x0: Posture (7,) at which the robot stands.
         x1: Posture (7,) to reach.
         time: Arrival time of what this motion frees.
-        why: Takes the culprit (6): part, point [m], radius [m], voxel.
+        why: Takes the culprit (9): part, point [m], radius [m], voxel, plate's axis.
 
     Returns:
         OK, BODY, TOOL, BEND or TRAVEL.

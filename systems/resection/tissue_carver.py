@@ -13,7 +13,7 @@ from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.resection.execution import Execution
 from systems.resection.resection_ik import universal
-from systems.resection.snake_body import OK, body_of, check_body, corners
+from systems.resection.snake_body import CULPRIT, OK, body_of, check_body, corners
 from systems.resection.space import SOLID, Space, stamp
 from systems.resection.volume import CHANNEL, TUMOUR, Volume
 
@@ -68,7 +68,7 @@ def carve(
         least distance in m of tool or body to what is critical, and the tool's way
         in m.
     """
-    c, x, why = np.empty((8, 3)), np.empty(7), np.empty(6)
+    c, x, why = np.empty((8, 3)), np.empty(7), np.empty(CULPRIT)
     corners(x0, b.h, b.tool, c)
     p = c[7].copy()
     corners(x1, b.h, b.tool, c)

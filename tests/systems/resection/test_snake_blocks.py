@@ -11,6 +11,7 @@ from plants.snake.inverse_kinematics import BEND, LAST_BEND
 from plants.snake.kinematics import forward, frames, to_universal
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake import FAR, NEAR, POSITIONS
+from plants.snake.weight import weight
 from systems.resection.elastic_wires import ElasticWires, ElasticWiresParams, WireBreak
 from systems.resection.resection_ik import (
     HOLD,
@@ -122,7 +123,8 @@ def test_resection_ik_holds_still_when_it_cannot(target, status):
 
 
 def test_inverse_and_forward_actuation_undo_each_other():
-    inverse, forth = WireInverseActuation(), WireForwardActuation()
+    weightless = WireInverseActuationParams(gravity=[0.0, 0.0, 0.0])
+    inverse, forth = WireInverseActuation(weightless), WireForwardActuation()
     drums = out(inverse, fixed(inverse, posture=POSTURE), "drums")
     np.testing.assert_allclose(drums[:9], wire_lengths(POSTURE, SNAKE))
     context = fixed(forth, lengths=drums, rates=np.zeros(10))
@@ -142,6 +144,18 @@ def test_forward_actuation_leads_by_lag_and_hold():
     context = fixed(dut, lengths=one, rates=(two - one) / lead)
     desired = out(dut, context, "desired_state")
     np.testing.assert_allclose(desired[1:7], universal(later)[1:], atol=1e-6)
+
+
+def test_sag_is_made_up_for():
+    """The servos' set-point is beyond the posture by what its weight makes of them."""
+    inverse, forth = WireInverseActuation(), WireForwardActuation()
+    drums = out(inverse, fixed(inverse, posture=POSTURE), "drums")
+    context = fixed(forth, lengths=drums, rates=np.zeros(10))
+    lifted = np.array(universal(out(forth, context, "posture").tolist()))
+    drive = SnakeDriveParams()
+    gains = np.array([drive.travel_kp, *[drive.kp] * 6])
+    load = weight(universal(POSTURE), SNAKE, drive)
+    np.testing.assert_allclose(gains * (lifted - universal(POSTURE)), -load, atol=1e-9)
 
 
 def test_pretension_is_wound_in():
