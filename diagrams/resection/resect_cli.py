@@ -9,7 +9,12 @@ from pathlib import Path
 import shlex
 
 from diagrams.common.scenario import ScenarioError
-from diagrams.resection.resection_scenario import ResectionScenario, new_session
+from diagrams.resection.resection_scenario import (
+    ResectionScenario,
+    finish_plan,
+    new_session,
+    reach_of,
+)
 from systems.resection.feasibility_map import feasibility_map
 from systems.resection.planner import Planner
 from systems.resection.procedure import (
@@ -17,20 +22,23 @@ from systems.resection.procedure import (
     ENTRY,
     VOLUME,
     Procedure,
+    load_procedures,
     save_procedures,
 )
-from systems.resection.reach import find_reach
 from systems.resection.session import Session, load_session
+from systems.resection.volume import TUMOUR
 
 HELP = """\
 entry LENGTH RADIUS                  propose an entry procedure [mm]
 elementary X Y Z NX NY NZ LENGTH RADIUS   an elementary procedure [mm], axis N
 volume X Y Z NX NY NZ RADIUS         an elementary volume [mm]
    add `clipped` to leave out poses that fail; the paper's shape is refused whole
+suggest                              propose what gains most of some the planner tries
 check | commit | undo                ask of the proposal, make it part of the plan
 map                                  where elementary volumes are feasible now
 finish                               let the planner do the rest
-list | save FILE | quit              the plan; its procedures as JSON"""
+list | quit                          the plan; the session is saved
+save FILE | load FILE                its procedures as JSON; commit those of a file"""
 
 
 def procedure_from(words: list[str]) -> Procedure:
@@ -81,6 +89,8 @@ class Console:
             proposal.check(self.session.params)
             self.proposal = proposal
             return self._check()
+        if command == "suggest":
+            return self._suggest()
         if command == "check":
             return self._check()
         if command == "commit":
@@ -90,8 +100,8 @@ class Console:
         if command == "map":
             return self._map()
         if command == "finish":
-            reach = find_reach(self.session, self.scenario.seed)
-            Planner(self.session, reach.mask, self.scenario.planner).run()
+            reach = reach_of(self.session, self.scenario)
+            finish_plan(self.session, reach, self.scenario)
             return f"{self._share()}, {100 * reach.fraction:.1f} % are reachable"
         if command == "list":
             rows = [
@@ -103,7 +113,30 @@ class Console:
             chosen = [s.procedure for s in self.session.steps if s.procedure]
             save_procedures(chosen, Path(words[1]))
             return f"{len(chosen)} procedures: {words[1]}"
+        if command == "load" and len(words) == 2:
+            return self._load(Path(words[1]))
         return HELP
+
+    def _suggest(self) -> str:
+        tumour = self.session.volume.labels == TUMOUR
+        planner = Planner(self.session, tumour, self.scenario.planner)
+        good = planner.suggest()
+        if not good:
+            return "nothing that was tried gains enough; try `finish`"
+        self.proposal = good[0]
+        position = ", ".join(f"{1e3 * v:.1f}" for v in good[0].position or [])
+        axis = ", ".join(f"{v:.2f}" for v in good[0].axis())
+        return (
+            f"{1e3 * good[0].length:.0f} mm from ({position}) mm along ({axis}): "
+            + (self._check())
+        )
+
+    def _load(self, path: Path) -> str:
+        rows = []
+        for procedure in load_procedures(path):
+            self.proposal = procedure
+            rows.append(f"{procedure.name or procedure.kind}: {self._commit()}")
+        return "\n".join(rows)
 
     def _check(self) -> str:
         if self.proposal is None:

@@ -227,7 +227,7 @@ def _planned(text: str, holder: _Holder) -> Operation:
         ):
             raise ScenarioError(f"session {str(file)!r} is of another tumour or access")
     session.file = file
-    reach = _reach(session, scenario, file)
+    reach = reach_of(session, scenario)
     start = perf_counter()
     refusals = []
     for number, procedure in enumerate(scenario.procedures):
@@ -245,21 +245,15 @@ def _planned(text: str, holder: _Holder) -> Operation:
                 }
             )
     if scenario.automatic:
-        with progress_bar("planning", "of what can be reached") as progress:
-            Planner(
-                session,
-                reach.mask,
-                scenario.planner,
-                lambda share: progress(share, scenario.planner.target),
-            ).run()
+        finish_plan(session, reach, scenario)
     elif session.steps and session.steps[-1].kind != "home":
         session.go_home()
     return Operation(session, reach, refusals, perf_counter() - start, name)
 
 
-def _reach(session: Session, scenario: ResectionScenario, file: Path | None) -> Reach:
+def reach_of(session: Session, scenario: ResectionScenario) -> Reach:
     """The reachable part, from beside the session's file if it was found before."""
-    seed, effort = scenario.seed, scenario.reach_effort
+    file, seed, effort = session.file, scenario.seed, scenario.reach_effort
     if file is not None:
         saved = load_reach(beside(file, "reach"), session, seed, effort)
         if saved is not None:
@@ -271,6 +265,19 @@ def _reach(session: Session, scenario: ResectionScenario, file: Path | None) -> 
     if file is not None:
         save_reach(beside(file, "reach"), reach, session, seed, effort)
     return reach
+
+
+def finish_plan(session: Session, reach: Reach, scenario: ResectionScenario) -> None:
+    """Lets the planner do what is left."""
+    target = scenario.planner.target
+    with progress_bar("planning", "of what can be reached") as progress:
+        planner = Planner(
+            session,
+            reach.mask,
+            scenario.planner,
+            lambda share: progress(min(share, target), target),
+        )
+        planner.run()
 
 
 def executed(scenario: ResectionScenario) -> Execution:

@@ -149,12 +149,8 @@ def _blame(
 
 
 @compiled
-def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
-    """OK or BODY for a body with corners c (8, 3); the culprit goes to why (9,).
-
-    Parts 0 to 5 are the links behind each ball (0 what lies in the channel), 6 the
-    last plate's rim, 7 the shank. Those before `first` are taken for free.
-    """
+def check_links(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
+    """OK or BODY for the round body up to the last ball; as `check_body`."""
     if first == 0:
         z = c[0, 2] - b.h / 2
         while z > -b.body:
@@ -172,25 +168,59 @@ def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
             if at != FREE:
                 return _blame(why, link, x, y, z, b.body, at)
     x, y, z = c[5, 0], c[5, 1], c[5, 2]
-    if first <= 5:
-        at = body_solid(s, x, y, z, b.body)
-        if at != FREE:
-            return _blame(why, 5, x, y, z, b.body, at)
-    length = 2 * b.h + b.tool
-    n0, n1, n2 = (c[7, 0] - x) / length, (c[7, 1] - y) / length, (c[7, 2] - z) / length
-    at = plate_solid(s, x, y, z, n0, n1, n2, b.face, b.body)
+    at = body_solid(s, x, y, z, b.body)
     if at != FREE:
-        half = b.face / 2
-        why[6], why[7], why[8] = n0, n1, n2
-        return _blame(why, 6, x + half * n0, y + half * n1, z + half * n2, b.body, at)
+        return _blame(why, 5, x, y, z, b.body, at)
+    return OK
+
+
+@compiled
+def check_plate(s: Any, b: Any, c: Any, more: float, why: Any) -> int:
+    """OK or BODY for the last plate, taken for wider all round by `more` in m."""
+    length = 2 * b.h + b.tool
+    n0 = (c[7, 0] - c[5, 0]) / length
+    n1 = (c[7, 1] - c[5, 1]) / length
+    n2 = (c[7, 2] - c[5, 2]) / length
+    x, y, z = c[5, 0] - more * n0, c[5, 1] - more * n1, c[5, 2] - more * n2
+    at = plate_solid(s, x, y, z, n0, n1, n2, b.face + 2 * more, b.body + more)
+    if at == FREE:
+        return OK
+    half = b.face / 2
+    x, y, z = c[5, 0] + half * n0, c[5, 1] + half * n1, c[5, 2] + half * n2
+    why[6], why[7], why[8] = n0, n1, n2
+    return _blame(why, 6, x, y, z, b.body, at)
+
+
+@compiled
+def check_shank(s: Any, b: Any, c: Any, why: Any) -> int:
+    """OK or BODY for the tool's shank."""
+    length = 2 * b.h + b.tool
     along = b.face
     while along < length - b.radius + b.shank:
-        px, py, pz = x + along * n0, y + along * n1, z + along * n2
-        at = first_solid(s, px, py, pz, b.shank)
+        share = along / length
+        x = c[5, 0] + share * (c[7, 0] - c[5, 0])
+        y = c[5, 1] + share * (c[7, 1] - c[5, 1])
+        z = c[5, 2] + share * (c[7, 2] - c[5, 2])
+        at = first_solid(s, x, y, z, b.shank)
         if at != FREE:
-            return _blame(why, 7, px, py, pz, b.shank, at)
+            return _blame(why, 7, x, y, z, b.shank, at)
         along += b.shank
     return OK
+
+
+@compiled
+def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
+    """OK or BODY for a body with corners c (8, 3); the culprit goes to why (9,).
+
+    Parts 0 to 5 are the links behind each ball (0 what lies in the channel), 6 the
+    last plate, 7 the shank. Those before `first` are taken for free.
+    """
+    status = check_links(s, b, c, first, why)
+    if status == OK:
+        status = check_plate(s, b, c, 0.0, why)
+    if status == OK:
+        status = check_shank(s, b, c, why)
+    return status
 
 
 @compiled
@@ -203,6 +233,13 @@ def check_limits(b: Any, x: Any) -> int:
         if math.cos(x[1 + 2 * k]) * math.cos(x[2 + 2 * k]) < least:
             return BEND
     return OK
+
+
+@compiled
+def between(x0: Any, x1: Any, share: float, out: Any) -> None:
+    """The posture at a share of the straight way; at 1 exactly x1."""
+    for r in range(7):
+        out[r] = x1[r] if share == 1.0 else x0[r] + share * (x1[r] - x0[r])
 
 
 @compiled
@@ -251,34 +288,47 @@ def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
         for r in range(3):
             d += (c1[n, r] - c0[n, r]) ** 2
         longest = max(longest, d)
-    steps = max(1, math.ceil(EDGE_SHARE * math.sqrt(longest) / b.step))
+    longest = math.sqrt(longest)
+    steps = max(1, math.ceil(EDGE_SHARE * longest / b.step))
+    stretch = EDGE_SHARE // TOOL_SHARE
     sure, freed, roomed = 0, s.used[0], s.used[1]
     moving = 4  # the first part of the body that moves: the last module
     for r in range(5):
         if x0[r] != x1[r]:
             moving = 0
+    roomy = False  # the plate has room all along this stretch
     for n in range(1, steps + 1):
-        share = n / steps
-        for r in range(7):
-            x[r] = x1[r] if n == steps else x0[r] + share * (x1[r] - x0[r])
-        corners(x, b.h, b.tool, c0)
-        whole = n % EDGE_SHARE == 0 or n == steps
-        status = check_body(s, b, c0, moving if whole else 6, why)
-        if not whole and n % (EDGE_SHARE // TOOL_SHARE) != 0:
-            if status != OK:
-                roll_back(s, freed, roomed)
-                return status, sure / steps
+        if n % stretch == 1:
+            # Once for all of it: no corner of the body goes farther from its middle.
+            last = min(n + stretch - 1, steps)
+            between(x0, x1, (n + last) / (2 * steps), x)
+            corners(x, b.h, b.tool, c0)
+            more = (last - n) / (2 * steps) * longest
+            roomy = check_plate(s, b, c0, more, why) == OK
+        if roomy and n % stretch != 0 and n != steps:
             continue
-        if status == OK:
-            at = first_forbidden(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius)
-            if at != FREE:
-                why[0], why[1], why[2], why[3] = 8, c0[7, 0], c0[7, 1], c0[7, 2]
-                why[4], why[5] = b.radius, at
-                status = TOOL
+        between(x0, x1, n / steps, x)
+        corners(x, b.h, b.tool, c0)
+        status = OK
+        whole = n % EDGE_SHARE == 0 or n == steps
+        if whole:
+            status = check_links(s, b, c0, moving, why)
+        if status == OK and not roomy:
+            status = check_plate(s, b, c0, 0.0, why)
+        if n % stretch == 0 or n == steps:
+            if status == OK:
+                status = check_shank(s, b, c0, why)
+            if status == OK:
+                at = first_forbidden(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius)
+                if at != FREE:
+                    why[0], why[1], why[2], why[3] = 8, c0[7, 0], c0[7, 1], c0[7, 2]
+                    why[4], why[5] = b.radius, at
+                    status = TOOL
+            if status == OK:
+                stamp(s, c0[7, 0], c0[7, 1], c0[7, 2], b.frees, time)
         if status != OK:
             roll_back(s, freed, roomed)
             return status, sure / steps
-        stamp(s, c0[7, 0], c0[7, 1], c0[7, 2], b.frees, time)
         if whole:
             sure, freed, roomed = n, s.used[0], s.used[1]
     return OK, 1.0

@@ -126,7 +126,12 @@ def test_console(tmp_path, monkeypatch, capsys):
         "entry 20\n",
         "elementary 0 0 30 0 0 1 4 6\n",
         "list\n",
+        f"save {tmp_path / 'p.json'}\n",
         "undo\n",
+        f"load {tmp_path / 'p.json'}\n",
+        "suggest\n",
+        "commit\n",
+        "load none.json\n",
         "nonsense\n",
         "quit\n",
     ]
@@ -143,6 +148,9 @@ def test_console(tmp_path, monkeypatch, capsys):
     assert "entry takes 2 numbers, not 1" in out
     assert "never freed" in out or "tool outside" in out
     assert "took back entry" in out and "undo" in out
+    assert "entry: committed" in out and "none.json holds no procedures" in out
+    assert "mm along (" in out
+    assert out.count("committed") == 3
     assert file.exists()
 
 
