@@ -5,7 +5,11 @@ from pathlib import Path
 import shutil
 import subprocess
 
+from hypothesis import settings
 import pytest
+
+settings.register_profile("repeatable", derandomize=True)
+settings.load_profile("repeatable")
 
 CHROMIUM_FLAGS = [
     "--headless",

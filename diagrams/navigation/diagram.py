@@ -14,10 +14,11 @@ from plants.turtlebot.arena import add_arena
 from plants.turtlebot.turtlebot import make_turtlebot
 from systems.switching.classical_planner import ClassicalPlanner
 from systems.switching.crowd_motion import CrowdMotion
+from systems.switching.navigation_planner import PERIOD
 from systems.switching.obstacle_motion import ObstacleMotion, ObstacleParams
 from systems.switching.perception import Perception
 from systems.switching.statechart_planner import StatechartPlanner
-from systems.switching.switching_planner import PERIOD, SwitchingPlanner
+from systems.switching.switching_planner import SwitchingPlanner
 from systems.switching.unicycle_control import UnicycleControl
 
 WIRES = (

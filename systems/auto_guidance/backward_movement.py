@@ -11,6 +11,7 @@ O stops.
 """
 
 from dataclasses import dataclass
+from functools import partial
 from math import exp
 from typing import Any
 
@@ -23,7 +24,6 @@ from systems.auto_guidance.signals import (
     usable,
     velocity,
 )
-from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
@@ -34,6 +34,7 @@ from systems.common.geometry import (
     unit,
     xyz,
 )
+from systems.common.step_block import StepBlock
 
 FORMS = ("corrected", "printed")
 
@@ -116,13 +117,13 @@ def _step(
     guide: np.ndarray,
     obstacle: np.ndarray,
 ) -> np.ndarray:
-    """The next state: v_3 and the time."""
+    """The next state, v_3 and the time (4), and v_3 (3)."""
     dt = time - state[3]
     v3 = backward_movement(record[0], xyz(state, 0), dt, guide, obstacle)
-    return np.array((v3[0], v3[1], v3[2], time))
+    return np.array(v3 + (time,) + v3)
 
 
-class BackwardMovement(Block):
+class BackwardMovement(StepBlock):
     """Makes the robot's tool give way to the obstacle tool that pushes it.
 
     Bauzano et al., section 4.3, equation (5); see the module.
@@ -145,29 +146,12 @@ class BackwardMovement(Block):
             ValueError: If a parameter is out of range.
         """
         super().__init__()
-        self._params = params or BackwardMovementParams()
-        self._params.check()
-        self._constants = constants(self._params)
-        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
-        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        inputs = {
-            self._guide.ticket(),
-            self._obstacle.ticket(),
-            self.xd_ticket(),
-            self.time_ticket(),
-        }
-        # The output and the update share one step.
-        self._step = self.cached("step", self._calc_step, inputs)
-        step_ticket = {self._step.ticket()}
-        self.vector_out("v3", 3, lambda c: self._step.Eval(c)[:3], step_ticket)
-        self.update_every(self._params.period, self._step.Eval)
-
-    def _calc_step(self, context: Any) -> np.ndarray:
-        return _step(
-            self._constants,
-            context.get_discrete_state_vector().value(),
-            context.get_time(),
-            self._guide.Eval(context),
-            self._obstacle.Eval(context),
+        params = params or BackwardMovementParams()
+        params.check()
+        self.declare_step(
+            partial(_step, constants(params)),
+            {"guide": GUIDE_EXAMPLE, "obstacle": OBSTACLE_EXAMPLE},
+            [0.0, 0.0, 0.0, -params.period],
+            {"v3": 3},
+            params.period,
         )

@@ -26,6 +26,7 @@ asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_
 """
 
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -45,7 +46,6 @@ from systems.auto_guidance.signals import (
     usable,
 )
 from systems.auto_guidance.workspace import WorkspaceParams, borders
-from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
@@ -63,6 +63,7 @@ from systems.common.geometry import (
     xyz,
 )
 from systems.common.projection import greatest_rate, nearest_velocity
+from systems.common.step_block import StepBlock
 
 _PARALLEL = 0.2
 """Sine of the angle below which a tip's own distance is constrained as well."""
@@ -340,7 +341,7 @@ def _step(
     return result
 
 
-class ClearanceConstraint(Block):
+class ClearanceConstraint(StepBlock):
     """Holds a hard clearance to the surgeon's tools under any planner.
 
     After the fuzzy sum, before the tool's navigation; see the module. While an estimate
@@ -383,33 +384,27 @@ class ClearanceConstraint(Block):
         """
         super().__init__()
         params = params or ClearanceConstraintParams()
-        self._constants = (
+        step = partial(
+            _step,
             constants(params),
             tools_around.constants(margins or Margins()),
             limits.constants(workspace or WorkspaceParams()),
         )
-        self._inputs = [
-            self.vector_in("v_R", [0.05, 0.0, 0.0]),
-            self.vector_in("guide", GUIDE_EXAMPLE),
-            self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE),
-            self.vector_in("obstacle", OBSTACLE_EXAMPLE),
-            self.vector_in("target", TARGET_EXAMPLE),
-            self.vector_in("camera", CAMERA_EXAMPLE),
-            self.vector_in("view_cone", VIEW_CONE_EXAMPLE),
-        ]
-        self._permission = self.vector_in("permission", _FREE.tolist())
-        self.DeclareDiscreteState(np.zeros(TOOLS))
-        inputs = {port.ticket() for port in (*self._inputs, self._permission)}
-        inputs |= {self.xd_ticket()}
-        self._step = self.cached("step", self._calc_step, inputs)
-        step_ticket = {self._step.ticket()}
-        self.vector_out("v_safe", 3, lambda c: self._step.Eval(c)[3:6], step_ticket)
-        self.vector_out("status", 6, lambda c: self._step.Eval(c)[6:], step_ticket)
-        self.update_every(params.period, lambda c: self._step.Eval(c)[:3])
-
-    def _calc_step(self, context: Any) -> np.ndarray:
-        told = self._permission.HasValue(context)
-        inputs = [port.Eval(context) for port in self._inputs]
-        inputs.append(self._permission.Eval(context) if told else _FREE)
-        state = context.get_discrete_state_vector().value()
-        return _step(*self._constants, state, *inputs)
+        self.declare_step(
+            step,
+            {
+                "v_R": [0.05, 0.0, 0.0],
+                "guide": GUIDE_EXAMPLE,
+                "robot_tool": ROBOT_TOOL_EXAMPLE,
+                "obstacle": OBSTACLE_EXAMPLE,
+                "target": TARGET_EXAMPLE,
+                "camera": CAMERA_EXAMPLE,
+                "view_cone": VIEW_CONE_EXAMPLE,
+                "permission": _FREE.tolist(),
+            },
+            [0.0] * TOOLS,
+            {"v_safe": 3, "status": 6},
+            params.period,
+            timed=False,
+            defaults={"permission": _FREE},
+        )

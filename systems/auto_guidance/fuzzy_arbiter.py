@@ -25,6 +25,7 @@ An obstacle at rest has no direction, and is left to the field.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from math import sqrt
 from typing import Any
 
@@ -38,7 +39,6 @@ from systems.auto_guidance.signals import (
     TARGET_EXAMPLE,
     usable,
 )
-from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
@@ -53,6 +53,7 @@ from systems.common.geometry import (
     unit,
     xyz,
 )
+from systems.common.step_block import StepBlock
 
 TABLE_I = [
     ["A", "FA", "HC", "C"],
@@ -335,7 +336,7 @@ def _step(
     return np.array(v_tip + (time,) + weights + v_r)
 
 
-class FuzzyArbiter(Block):
+class FuzzyArbiter(StepBlock):
     """Weighs the three behaviours and adds them up to the guide point's velocity.
 
     Bauzano et al., section 4, Table I and equation (6); see the module. While an
@@ -367,34 +368,20 @@ class FuzzyArbiter(Block):
             ValueError: If a parameter is out of range.
         """
         super().__init__()
-        self._params = params or FuzzyArbiterParams()
-        self._params.check()
-        self._constants = constants(self._params)
-        examples = {
-            "v1": [0.05, 0.0, 0.0],
-            "v2": [-0.01, 0.0, 0.0],
-            "v3": [0.0, -0.01, 0.0],
-            "guide": GUIDE_EXAMPLE,
-            "robot_tool": ROBOT_TOOL_EXAMPLE,
-            "obstacle": OBSTACLE_EXAMPLE,
-            "target": TARGET_EXAMPLE,
-        }
-        # In the order in which `_step` takes them.
-        self._inputs = [self.vector_in(*item) for item in examples.items()]
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        tickets = {port.ticket() for port in self._inputs}
-        self._step = self.cached(
-            "step", self._calc_step, tickets | {self.xd_ticket(), self.time_ticket()}
-        )
-        step_ticket = {self._step.ticket()}
-        self.vector_out("weights", 3, lambda c: self._step.Eval(c)[4:7], step_ticket)
-        self.vector_out("v_R", 3, lambda c: self._step.Eval(c)[7:], step_ticket)
-        self.update_every(self._params.period, lambda c: self._step.Eval(c)[:4])
-
-    def _calc_step(self, context: Any) -> np.ndarray:
-        return _step(
-            self._constants,
-            context.get_discrete_state_vector().value(),
-            context.get_time(),
-            *[port.Eval(context) for port in self._inputs],
+        params = params or FuzzyArbiterParams()
+        params.check()
+        self.declare_step(
+            partial(_step, constants(params)),
+            {
+                "v1": [0.05, 0.0, 0.0],
+                "v2": [-0.01, 0.0, 0.0],
+                "v3": [0.0, -0.01, 0.0],
+                "guide": GUIDE_EXAMPLE,
+                "robot_tool": ROBOT_TOOL_EXAMPLE,
+                "obstacle": OBSTACLE_EXAMPLE,
+                "target": TARGET_EXAMPLE,
+            },
+            [0.0, 0.0, 0.0, -params.period],
+            {"weights": 3, "v_R": 3},
+            params.period,
         )

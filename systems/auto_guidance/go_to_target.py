@@ -29,6 +29,7 @@ the robot away from its goal rather than from the obstacle, and orbits.
 """
 
 from dataclasses import dataclass
+from functools import partial
 from math import exp, sqrt
 from typing import Any
 
@@ -42,7 +43,6 @@ from systems.auto_guidance.signals import (
     usable,
     velocity,
 )
-from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
@@ -58,6 +58,7 @@ from systems.common.geometry import (
     unit,
     xyz,
 )
+from systems.common.step_block import StepBlock
 
 FORMS = ("corrected", "printed")
 
@@ -341,7 +342,7 @@ def _step(
     return np.array(v_tip + (time,) + v1 + guide)
 
 
-class GoToTarget(Block):
+class GoToTarget(StepBlock):
     """Leads the guide point to its target round the obstacle tool by a potential field.
 
     Bauzano et al., section 4.1, equations (1) to (4); see the module.
@@ -367,33 +368,16 @@ class GoToTarget(Block):
             ValueError: If a parameter is out of range.
         """
         super().__init__()
-        self._params = params or GoToTargetParams()
-        self._params.check()
-        self._constants = constants(self._params)
-        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
-        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
-        self._target = self.vector_in("target", TARGET_EXAMPLE)
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -self._params.period]))
-        inputs = {
-            self._robot_tool.ticket(),
-            self._obstacle.ticket(),
-            self._target.ticket(),
-            self.xd_ticket(),
-            self.time_ticket(),
-        }
-        # Both outputs and the update share one step.
-        self._step = self.cached("step", self._calc_step, inputs)
-        step_ticket = {self._step.ticket()}
-        self.vector_out("v1", 3, lambda c: self._step.Eval(c)[4:7], step_ticket)
-        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[7:], step_ticket)
-        self.update_every(self._params.period, lambda c: self._step.Eval(c)[:4])
-
-    def _calc_step(self, context: Any) -> np.ndarray:
-        return _step(
-            self._constants,
-            context.get_discrete_state_vector().value(),
-            context.get_time(),
-            self._robot_tool.Eval(context),
-            self._obstacle.Eval(context),
-            self._target.Eval(context),
+        params = params or GoToTargetParams()
+        params.check()
+        self.declare_step(
+            partial(_step, constants(params)),
+            {
+                "robot_tool": ROBOT_TOOL_EXAMPLE,
+                "obstacle": OBSTACLE_EXAMPLE,
+                "target": TARGET_EXAMPLE,
+            },
+            [0.0, 0.0, 0.0, -params.period],
+            {"v1": 3, "guide": 12},
+            params.period,
         )

@@ -10,6 +10,7 @@ moving target, and the guide point's v_1 = s v, as in the paper's form (`go_to_t
 """
 
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -31,9 +32,9 @@ from systems.auto_guidance.signals import (
     velocity,
 )
 from systems.auto_guidance.workspace import WorkspaceParams
-from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import Vector, all_finite, along, limited, sub, xyz
+from systems.common.step_block import StepBlock
 
 
 @dataclass
@@ -206,7 +207,7 @@ def _step(
     return np.array(v_tip + memory + v1 + guide + way)
 
 
-class ToolBypass(Block):
+class ToolBypass(StepBlock):
     """Leads R's tip to the target: straight, or over an edge of the tools in its way.
 
     A third form of the paper's "Go-to Target" (section 4.1); see the module.
@@ -247,33 +248,22 @@ class ToolBypass(Block):
         """
         super().__init__()
         params = params or ToolBypassParams()
-        self._constants = (
+        step = partial(
+            _step,
             constants(params),
             tools_around.constants(margins or Margins()),
             limits.constants(workspace or WorkspaceParams()),
         )
-        self._inputs = [
-            self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE),
-            self.vector_in("obstacle", OBSTACLE_EXAMPLE),
-            self.vector_in("target", TARGET_EXAMPLE),
-            self.vector_in("camera", CAMERA_EXAMPLE),
-            self.vector_in("view_cone", VIEW_CONE_EXAMPLE),
-        ]
-        self.DeclareDiscreteState(np.array([0.0, 0.0, 0.0, -params.period] + [0.0] * 3))
-        inputs = {port.ticket() for port in self._inputs}
-        self._step = self.cached(
-            "step", self._calc_step, inputs | {self.xd_ticket(), self.time_ticket()}
-        )
-        step_ticket = {self._step.ticket()}
-        self.vector_out("v1", 3, lambda c: self._step.Eval(c)[7:10], step_ticket)
-        self.vector_out("guide", 12, lambda c: self._step.Eval(c)[10:22], step_ticket)
-        self.vector_out("way", 6, lambda c: self._step.Eval(c)[22:], step_ticket)
-        self.update_every(params.period, lambda c: self._step.Eval(c)[:7])
-
-    def _calc_step(self, context: Any) -> np.ndarray:
-        return _step(
-            *self._constants,
-            context.get_discrete_state_vector().value(),
-            context.get_time(),
-            *(port.Eval(context) for port in self._inputs),
+        self.declare_step(
+            step,
+            {
+                "robot_tool": ROBOT_TOOL_EXAMPLE,
+                "obstacle": OBSTACLE_EXAMPLE,
+                "target": TARGET_EXAMPLE,
+                "camera": CAMERA_EXAMPLE,
+                "view_cone": VIEW_CONE_EXAMPLE,
+            },
+            [0.0, 0.0, 0.0, -params.period, 0.0, 0.0, 0.0],
+            {"v1": 3, "guide": 12, "way": 6},
+            params.period,
         )

@@ -189,6 +189,8 @@ class TissueCarver(Block):
 
     Port ``touched`` emits how many checks found the body in tissue, and the least
     distance of robot and tool to what is critical so far [m], -1 if nothing is (2).
+
+    Port ``way`` emits how far the tool went [m] (1).
     """
 
     def __init__(

@@ -8,25 +8,17 @@ the sum vanishes. It keeps no state.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, isfinite
-from typing import Any
 
-from systems.common.block import Block
 from systems.switching.arcs import Obstacle
 from systems.switching.fields import (
     attractive_field,
     printed_repulsive_field,
     repulsive_field,
 )
-from systems.switching.signals import (
-    CAPACITY,
-    GOAL_EXAMPLE,
-    ROBOT_EXAMPLE,
-    seen_example,
-    tracks,
-)
+from systems.switching.navigation_planner import PERIOD, NavigationPlanner
+from systems.switching.signals import CAPACITY
 
 FORMS = ("khatib", "printed")
-PERIOD = 0.05
 
 
 @dataclass
@@ -94,7 +86,7 @@ def summed_fields(
     return scale * fx, scale * fy
 
 
-class ClassicalPlanner(Block):
+class ClassicalPlanner(NavigationPlanner):
     """Takes the sum of all potentials' anti-gradients for its velocity.
 
     Section 2.1 of the thesis; see the module.
@@ -122,20 +114,16 @@ class ClassicalPlanner(Block):
         super().__init__()
         self.params = params or ClassicalParams()
         self.params.check()
-        self._robot = self.vector_in("robot", ROBOT_EXAMPLE)
-        self._seen = self.vector_in("seen", seen_example(capacity))
-        self._goal = self.vector_in("goal", GOAL_EXAMPLE)
-        self._state = self.DeclareDiscreteState(2)
-        held = {self.xd_ticket()}
-        self.vector_out("v_R", 2, self._calc_v_R, held)
-        self.vector_out("mode", 5, lambda context: [0.0, -1.0, 1.0, 0.0, 0.0], held)
-        self.update_every(period, self._update)
+        stays = [0.0, -1.0, 1.0, 0.0, 0.0]
+        self.declare([0.0, 0.0], lambda held: stays, capacity, period)
 
-    def _calc_v_R(self, context: Any) -> Sequence[float]:
-        return context.get_discrete_state(self._state).value()
-
-    def _update(self, context: Any) -> Sequence[float]:
-        x, y = self._robot.Eval(context).tolist()[:2]
-        gx, gy = self._goal.Eval(context).tolist()
-        seen = tracks(self._seen.Eval(context).tolist())
-        return summed_fields(self.params, (x, y), (gx, gy), seen)
+    def plan(
+        self,
+        held: list[float],
+        robot: list[float],
+        goal: list[float],
+        seen: list[Obstacle],
+    ) -> Sequence[float]:
+        """The velocity to take (2)."""
+        here, there = (robot[0], robot[1]), (goal[0], goal[1])
+        return summed_fields(self.params, here, there, seen)

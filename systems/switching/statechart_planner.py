@@ -11,22 +11,15 @@ meet, so that the heading never jumps.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import acos, atan2, cos, hypot, isfinite, sin
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from systems.common.block import Block
 from systems.switching.arcs import Obstacle
 from systems.switching.fields import attractive_field, helicoid_field
-from systems.switching.signals import (
-    CAPACITY,
-    GOAL_EXAMPLE,
-    ROBOT_EXAMPLE,
-    seen_example,
-    tracks,
-)
+from systems.switching.navigation_planner import PERIOD, NavigationPlanner
+from systems.switching.signals import CAPACITY
 
 ATTRACTIVE, TO_CIRCLE, ROUND_OBSTACLE = range(3)
 STATES = ("attractive", "about Omega", "about the obstacle")
-PERIOD = 0.05
 
 
 @dataclass
@@ -192,7 +185,7 @@ def statechart_step(
     return scale * vx, scale * vy, m
 
 
-class StatechartPlanner(Block):
+class StatechartPlanner(NavigationPlanner):
     """The thesis's own method: attractive, or one of two helicoids in turn.
 
     Figures 11 and 12; see the module. Obstacles' velocities are ignored.
@@ -220,24 +213,22 @@ class StatechartPlanner(Block):
         super().__init__()
         self.params = params or StatechartParams()
         self.params.check()
-        self._robot = self.vector_in("robot", ROBOT_EXAMPLE)
-        self._seen = self.vector_in("seen", seen_example(capacity))
-        self._goal = self.vector_in("goal", GOAL_EXAMPLE)
-        self._state = self.DeclareDiscreteState([0.0, 0.0, *Manoeuvre()])
-        held = {self.xd_ticket()}
-        self.vector_out("v_R", 2, lambda context: self._held(context)[:2], held)
-        self.vector_out(
-            "mode", 5, lambda context: [*self._held(context)[2:5], 0.0, 0.0], held
+        self.declare(
+            [0.0, 0.0, *Manoeuvre()],
+            lambda held: [*held[2:5], 0.0, 0.0],
+            capacity,
+            period,
         )
-        self.update_every(period, self._update)
 
-    def _held(self, context: Any) -> list[float]:
-        return context.get_discrete_state(self._state).value().tolist()
-
-    def _update(self, context: Any) -> Sequence[float]:
-        x, y = self._robot.Eval(context).tolist()[:2]
-        gx, gy = self._goal.Eval(context).tolist()
-        seen = tracks(self._seen.Eval(context).tolist())
-        memory = Manoeuvre(*self._held(context)[2:])
-        vx, vy, memory = statechart_step(self.params, memory, (x, y), (gx, gy), seen)
+    def plan(
+        self,
+        held: list[float],
+        robot: list[float],
+        goal: list[float],
+        seen: list[Obstacle],
+    ) -> Sequence[float]:
+        """The velocity to take (2), then the manoeuvre."""
+        here, there = (robot[0], robot[1]), (goal[0], goal[1])
+        memory = Manoeuvre(*held[2:])
+        vx, vy, memory = statechart_step(self.params, memory, here, there, seen)
         return [vx, vy, *memory]

@@ -15,6 +15,10 @@ from diagrams.common.study import get_study
 import plants
 import systems
 from systems.common.block import Block
+from systems.common.step_block import StepBlock
+from systems.switching.navigation_planner import NavigationPlanner
+
+BASES = (Block, StepBlock, NavigationPlanner)
 
 
 def all_blocks(package) -> list[type]:
@@ -24,7 +28,7 @@ def all_blocks(package) -> list[type]:
         module = importlib.import_module(info.name)
         for _, kind in inspect.getmembers(module, inspect.isclass):
             own = kind.__module__ == info.name
-            if own and issubclass(kind, LeafSystem) and kind is not Block:
+            if own and issubclass(kind, LeafSystem) and kind not in BASES:
                 found.append(kind)
     return sorted(found, key=lambda kind: kind.__name__)
 

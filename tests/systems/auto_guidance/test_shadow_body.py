@@ -63,7 +63,8 @@ def test_the_shadow_body_is_convex(a, tip, one, other, share):
 @given(points(), points(), points(), st.floats(0.0, 1.0))
 def test_a_shorter_insertion_is_never_nearer(a, tip, p, share):
     shorter = geometry.along(G, share, p)
-    assert distance(shorter, a, tip) >= distance(p, a, tip) - 1e-12
+    # Of ends within a nanometre the closest points take the one farther along.
+    assert distance(shorter, a, tip) >= distance(p, a, tip) - 2e-9
 
 
 @MANY
