@@ -20,9 +20,20 @@ CUT = ListedColormap(["#f4f1ee", "#e8b56a", "#ffffff", "#dbe7f3", "#b01820", "#c
 """Brain, tumour, removed, channel and cap, critical, healthy tissue removed."""
 
 
-def step_color(number: int) -> str:
-    """Colour of the n-th step."""
-    return STEP_COLORS[number % len(STEP_COLORS)]
+FINISH_COLOR = "#9aa3ad"
+"""Of the finisher's single steps."""
+
+
+def step_colors(steps: list[Any]) -> list[str]:
+    """Colours of a plan's steps: procedures in turn, single steps all alike."""
+    colors, number = [], 0
+    for step in steps:
+        if step.kind == "finish":
+            colors.append(FINISH_COLOR)
+        else:
+            colors.append(STEP_COLORS[number % len(STEP_COLORS)])
+            number += 1
+    return colors
 
 
 def _mesh(axes: Any, mask: np.ndarray, volume: Any, color: str, alpha: float) -> None:
@@ -48,7 +59,7 @@ def _equal(axes: Any, volume: Any) -> None:
         ylabel="y [mm]",
         zlabel="z [mm]",
     )
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_box_aspect((1, 1, 1), zoom=0.86)
     axes.view_init(elev=18, azim=-62)
     axes.invert_zaxis()
 
@@ -58,28 +69,32 @@ def figure8(run: Any) -> Figure:
     session = plan_operation(run.scenario).session
     volume = session.volume
     figure = new_figure(10.0, 5.2)
-    left = add_axes(figure, 1, 2, 1, projection="3d")
+    left = add_axes(figure, 1, 2, 1, projection="3d", computed_zorder=False)
     _mesh(left, volume.labels == TUMOUR, volume, "#c9c2ba", 0.12)
     tips = session.tips * MM
     chosen = [step for step in session.steps if step.kind != "home"]
-    shown = chosen if len(chosen) <= 8 else [*chosen[:7], chosen[-1]]
-    for number, step in enumerate(chosen):
+    labelled = [step.name for step in chosen if step.kind != "finish"][:8]
+    for step, color in zip(chosen, step_colors(chosen), strict=True):
         path = tips[max(step.first - 1, 0) : step.last]
-        label = step.name if step in shown else None
-        left.plot(*path.T, color=step_color(number), lw=0.5, label=label)
+        label = step.name if step.name in labelled else None
+        if step.name == "finish 1":
+            label = "single steps"
+        single = step.kind == "finish"  # there are many: behind the others
+        look = {"lw": 0.3, "zorder": 2} if single else {"lw": 0.6, "zorder": 3}
+        left.plot(*path.T, color=color, label=label, **look)
     _equal(left, volume)
     if chosen:
         legend = left.legend(loc="upper left", fontsize=7)
         for line in legend.get_lines():
             line.set_linewidth(2.0)
-    left.set_title("trajectory of the tool")
+    left.set_title("trajectory of the tool", y=0.95)
     right = add_axes(figure, 1, 2, 2, projection="3d")
     removed = (volume.labels == TUMOUR) & (carving_of(run).volume.tau != SOLID)
     _mesh(right, volume.labels == TUMOUR, volume, "#c9c2ba", 0.12)
     _mesh(right, removed, volume, "#e5b80b", 0.9)
     _equal(right, volume)
     share = run.metrics["resected_fraction"]
-    right.set_title(f"resected: {100 * share:.1f} % of the tumour")
+    right.set_title(f"resected: {100 * share:.1f} % of the tumour", y=0.95)
     return figure
 
 
@@ -149,6 +164,7 @@ def _timeline(axes: Any, run: Any, session: Any) -> None:
     axes.axhline(reach, color=COLORS["target"], lw=1.0, ls="--")
     station = run.diagram.GetSubsystemByName("station")
     times = (before + station.GetSubsystemByName("procedure_player").times) / 60
+    colors = step_colors(session.steps)
     axes.set(
         xlabel="time [min]",
         ylabel="resected [%]",
@@ -159,19 +175,18 @@ def _timeline(axes: Any, run: Any, session: Any) -> None:
         before / 60, reach + 0.8, " reachable", color=COLORS["target"], fontsize=8
     )
     axes.grid(alpha=0.3)
-    for number, step in enumerate(session.steps):
+    for step, color in zip(session.steps, colors, strict=True):
         if step.kind == "home":
             continue
         first = times[max(step.first - 1, 0)]
         last = times[min(step.last - 1, len(times) - 1)]
-        axes.axvspan(first, last, ymax=0.05, color=step_color(number), lw=0)
+        axes.axvspan(first, last, ymax=0.05, color=color, lw=0)
 
 
 def _gains(axes: Any, session: Any) -> None:
     steps = [step for step in session.steps if step.kind != "home"]
     gains = np.array([step.gained for step in steps]) * 1e6
-    colors = [step_color(number) for number in range(len(steps))]
-    axes.bar(np.arange(1, len(steps) + 1), gains, color=colors)
+    axes.bar(np.arange(1, len(steps) + 1), gains, color=step_colors(steps))
     axes.set(xlabel="step of the plan", ylabel="removes [cm³]")
     axes.grid(axis="y", alpha=0.3)
 
@@ -190,7 +205,7 @@ def _figures(m: dict[str, Any]) -> str:
         if critical is None
         else f"nearest to what is critical {1e3 * critical:.2f} mm",
         f"body in tissue at {m['body_collisions']} checks",
-        f"{m['procedures']} procedures, {m['finishes']} finishing rounds",
+        f"{m['procedures']} procedures, then single steps in {m['finishes']} rounds",
         f"planned in {m['planning_time']:.1f} s, reach in {m['reach_time']:.1f} s",
         f"carried out in {m['execution_time'] / 60:.1f} min, tool path "
         f"{m['path_length']:.1f} m",
@@ -209,7 +224,8 @@ def _stayed(operation: Any) -> str:
     rows = ["what one entry cannot reach"]
     for lump in operation.reach.lumps[:9]:
         share = 100 * lump.volume / volume.tumour_volume
-        rows.append(f"{1e9 * lump.volume:.0f} mm³ ({share:.1f} %): {lump.reason}")
+        shown = f"{share:.1f} %" if share >= 0.1 else "< 0.1 %"
+        rows.append(f"{1e9 * lump.volume:.0f} mm³ ({shown}): {lump.reason}")
     if len(rows) == 1:
         rows.append("nothing")
     return "\n".join(rows)
