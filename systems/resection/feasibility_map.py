@@ -14,7 +14,7 @@ from systems.resection.sweep import straightened, try_procedure
 from systems.resection.tree import nearest_nodes
 from systems.resection.volume import CRITICAL, TUMOUR
 
-NODES = 3
+NODES = 2
 """Postures of the tree from which a volume is tried."""
 
 TURNS = (0.6, 0.2)

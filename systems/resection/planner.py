@@ -29,6 +29,9 @@ NEAR = 16
 TURNS = 5
 """Turns of a candidate's axis that are tried, each half the one before."""
 
+VAIN = 5
+"""Rounds of the last stage in a row that free nothing, after which it ends."""
+
 WEARY = 100
 """Failed attempts after which a round asks for a voxel no more."""
 
@@ -147,9 +150,11 @@ class Planner:
         self.deadline = perf_counter() + self.params.time_limit
         for stage, gain in enumerate(self.params.step_gains):
             last = stage + 1 == len(self.params.step_gains)
-            rounds = 0
+            attempts = self.params.attempts * (4 if last else 1)
+            rounds, vain = 0, 0
             while (last or rounds < self.params.rounds) and self.unfinished():
-                if not self.finish(gain, self.params.attempts * (4 if last else 1)):
+                vain = 0 if self.finish(gain, attempts) else vain + 1
+                if vain == (VAIN if last else 1):
                     break
                 rounds += 1
                 self.progress(self.share)

@@ -37,11 +37,11 @@ CULPRIT = 9
 SHANK = 1.2e-3
 """Radius of the tool's shank in m."""
 
-TOOL_SHARE, EDGE_SHARE = 2, 8
+TOOL_SHARE, EDGE_SHARE = 2, 16
 """How much oftener than the round body the tool and the last plate are checked.
 
 Halfway between two checks a round body stands out of where it was found to fit by
-0.03 mm, an edge by up to 0.7 of half the way: 0.04 mm at an eighth of 1 mm. The
+0.03 mm, an edge by up to 0.7 of half the way: 0.02 mm at a sixteenth of 1 mm. The
 plan's clearance covers that and the tracking's error.
 """
 

@@ -48,11 +48,11 @@ def test_plan_is_free_by_an_independent_check(planned):
 
 
 def test_nothing_stands_out_between_the_checks(planned):
-    """Carved ten times finer than it was checked, tool 0.02 mm smaller, body wider."""
+    """Carved ten times finer than it was checked, tool 0.01 mm smaller, body wider."""
     session, _ = planned
     carving = Carving(session.volume, session.params)
-    carving.body = body_of(session.params, clearance=0.02e-3)._replace(
-        radius=session.params.tool_radius - 0.02e-3
+    carving.body = body_of(session.params, clearance=0.01e-3)._replace(
+        radius=session.params.tool_radius - 0.01e-3
     )
     x = session.postures
     for index in range(len(x) - 1):
