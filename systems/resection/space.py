@@ -64,37 +64,80 @@ class Space(NamedTuple):
 
 
 @compiled
+def in_channel(s: Any, x: float, y: float, z: float, rho: float) -> bool:
+    """Whether a ball lies in the access channel."""
+    return z + rho <= s.depth and x * x + y * y <= (s.channel - rho) ** 2
+
+
+@compiled
+def in_voxels(s: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A point in units of voxels: voxel (i, j, k) has its centre there."""
+    return (
+        (x - s.origin[0]) / s.spacing,
+        (y - s.origin[1]) / s.spacing,
+        (z - s.origin[2]) / s.spacing,
+    )
+
+
+@compiled
+def on_grid(
+    s: Any, u: float, v: float, w: float, du: float, dv: float, dw: float
+) -> bool:
+    """Whether a box about a point lies on the grid; all in voxels."""
+    nx, ny, nz = s.size
+    return (
+        u - du >= -0.5
+        and v - dv >= -0.5
+        and w - dw >= -0.5
+        and u + du <= nx - 0.5
+        and v + dv <= ny - 0.5
+        and w + dw <= nz - 0.5
+    )
+
+
+@compiled
+def span(u: float, r: float, size: int) -> tuple[int, int]:
+    """First voxel along an axis within r of u, and one past the last."""
+    return max(math.ceil(u - r), 0), min(math.floor(u + r) + 1, size)
+
+
+@compiled
+def row_span(
+    s: Any, v: float, w: float, left: float, a: int, b: int
+) -> tuple[int, int]:
+    """A ball's part of row (a, b): first flat index, and one past the last.
+
+    Args:
+        s: The space.
+        v: The ball's centre along y, in voxels.
+        w: The same along z.
+        left: Square of its radius in plane a, in voxels.
+        a: The row's x.
+        b: The row's y.
+    """
+    rest = left - (b - v) ** 2
+    if rest < 0.0:
+        return 0, 0
+    _, ny, nz = s.size
+    low, high = span(w, math.sqrt(rest), nz)
+    row = (a * ny + b) * nz
+    return row + low, row + high
+
+
+@compiled
 def first_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
     """The first voxel that a ball would meet: its flat index, FREE or OUTSIDE."""
-    if z + rho <= s.depth and x * x + y * y <= (s.channel - rho) ** 2:
+    if in_channel(s, x, y, z, rho):
         return FREE
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, x, y, z)
     r = rho / s.spacing
-    nx, ny, nz = s.size
-    if not (
-        u - r >= -0.5
-        and v - r >= -0.5
-        and w - r >= -0.5
-        and u + r <= nx - 0.5
-        and v + r <= ny - 0.5
-        and w + r <= nz - 0.5
-    ):
+    if not on_grid(s, u, v, w, r, r, r):
         return OUTSIDE
-    rr = r * r
-    for a in range(math.ceil(u - r), math.floor(u + r) + 1):
-        left = rr - (a - u) ** 2
-        if left < 0.0:
-            continue
-        across = math.sqrt(left)
-        for b in range(math.ceil(v - across), math.floor(v + across) + 1):
-            rest = left - (b - v) ** 2
-            if rest < 0.0:
-                continue
-            half = math.sqrt(rest)
-            row = (a * ny + b) * nz
-            for c in range(row + math.ceil(w - half), row + math.floor(w + half) + 1):
+    for a in range(*span(u, r, s.size[0])):
+        left = r * r - (a - u) ** 2
+        for b in range(*span(v, r, s.size[1])):
+            first, last = row_span(s, v, w, left, a, b)
+            for c in range(first, last):
                 if s.tau[c] == SOLID:
                     return c
     return FREE
@@ -154,23 +197,14 @@ def plate_solid(
     if max(z, end) + rim <= s.depth and max(out, far) + rho <= s.channel:
         return FREE
     half = length / 2
-    u = (x + half * n0 - s.origin[0]) / s.spacing
-    v = (y + half * n1 - s.origin[1]) / s.spacing
-    w = (z + half * n2 - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, x + half * n0, y + half * n1, z + half * n2)
     r, h = rho / s.spacing, half / s.spacing
     du = h * abs(n0) + r * math.sqrt(max(1.0 - n0 * n0, 0.0))
     dv = h * abs(n1) + r * math.sqrt(max(1.0 - n1 * n1, 0.0))
     dw = h * abs(n2) + r * math.sqrt(max(1.0 - n2 * n2, 0.0))
-    nx, ny, nz = s.size
-    if not (
-        u - du >= -0.5
-        and v - dv >= -0.5
-        and w - dw >= -0.5
-        and u + du <= nx - 0.5
-        and v + dv <= ny - 0.5
-        and w + dw <= nz - 0.5
-    ):
+    if not on_grid(s, u, v, w, du, dv, dw):
         return OUTSIDE
+    _, ny, nz = s.size
     for a in range(math.ceil(u - du), math.floor(u + du) + 1):
         for b in range(math.ceil(v - dv), math.floor(v + dv) + 1):
             row = (a * ny + b) * nz
@@ -187,41 +221,24 @@ def plate_solid(
 @compiled
 def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
     """The first voxel of a ball where the tool may not be, FREE or OUTSIDE."""
-    if z + rho <= s.depth and x * x + y * y <= (s.channel - rho) ** 2:
+    if in_channel(s, x, y, z, rho):
         return FREE
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, x, y, z)
     r = rho / s.spacing
-    nx, ny, nz = s.size
     at = voxel_of(s, x, y, z)
     if at >= 0:
+        _, ny, nz = s.size
         i, j, k = at // (ny * nz), at // nz % ny, at % nz
         off = math.sqrt((u - i) ** 2 + (v - j) ** 2 + (w - k) ** 2)
         if s.inside[at] - off > r:
             return FREE
-    if not (
-        u - r >= -0.5
-        and v - r >= -0.5
-        and w - r >= -0.5
-        and u + r <= nx - 0.5
-        and v + r <= ny - 0.5
-        and w + r <= nz - 0.5
-    ):
+    if not on_grid(s, u, v, w, r, r, r):
         return OUTSIDE
-    rr = r * r
-    for a in range(math.ceil(u - r), math.floor(u + r) + 1):
-        left = rr - (a - u) ** 2
-        if left < 0.0:
-            continue
-        across = math.sqrt(left)
-        for b in range(math.ceil(v - across), math.floor(v + across) + 1):
-            rest = left - (b - v) ** 2
-            if rest < 0.0:
-                continue
-            half = math.sqrt(rest)
-            row = (a * ny + b) * nz
-            for c in range(row + math.ceil(w - half), row + math.floor(w + half) + 1):
+    for a in range(*span(u, r, s.size[0])):
+        left = r * r - (a - u) ** 2
+        for b in range(*span(v, r, s.size[1])):
+            first, last = row_span(s, v, w, left, a, b)
+            for c in range(first, last):
                 if s.allowed[c] == 0:
                     return c
     return FREE
@@ -229,26 +246,15 @@ def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
 
 @compiled
 def count_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
-    """How many voxels of a ball are still solid; it must lie within the grid."""
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    """How many voxels of a ball are still solid."""
+    u, v, w = in_voxels(s, x, y, z)
     r = rho / s.spacing
-    _, ny, nz = s.size
-    rr = r * r
     count = 0
-    for a in range(math.ceil(u - r), math.floor(u + r) + 1):
-        left = rr - (a - u) ** 2
-        if left < 0.0:
-            continue
-        across = math.sqrt(left)
-        for b in range(math.ceil(v - across), math.floor(v + across) + 1):
-            rest = left - (b - v) ** 2
-            if rest < 0.0:
-                continue
-            half = math.sqrt(rest)
-            row = (a * ny + b) * nz
-            for c in range(row + math.ceil(w - half), row + math.floor(w + half) + 1):
+    for a in range(*span(u, r, s.size[0])):
+        left = r * r - (a - u) ** 2
+        for b in range(*span(v, r, s.size[1])):
+            first, last = row_span(s, v, w, left, a, b)
+            for c in range(first, last):
                 if s.tau[c] == SOLID:
                     count += 1
     return count
@@ -257,27 +263,13 @@ def count_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
 @compiled
 def stamp(s: Any, x: float, y: float, z: float, rho: float, time: int) -> None:
     """Frees what of a ball is still solid, at a time."""
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, x, y, z)
     r = rho / s.spacing
-    nx, ny, nz = s.size
-    rr = r * r
-    for a in range(max(math.ceil(u - r), 0), min(math.floor(u + r) + 1, nx)):
-        left = rr - (a - u) ** 2
-        if left < 0.0:
-            continue
-        across = math.sqrt(left)
-        for b in range(
-            max(math.ceil(v - across), 0), min(math.floor(v + across) + 1, ny)
-        ):
-            rest = left - (b - v) ** 2
-            if rest < 0.0:
-                continue
-            half = math.sqrt(rest)
-            row = (a * ny + b) * nz
-            low, high = max(math.ceil(w - half), 0), min(math.floor(w + half), nz - 1)
-            for c in range(row + low, row + high + 1):
+    for a in range(*span(u, r, s.size[0])):
+        left = r * r - (a - u) ** 2
+        for b in range(*span(v, r, s.size[1])):
+            first, last = row_span(s, v, w, left, a, b)
+            for c in range(first, last):
                 if s.tau[c] == SOLID:
                     s.tau[c] = time
                     s.freed[s.used[0]] = c
@@ -312,14 +304,12 @@ def nearest_in_ball(
         Its flat index, or OUTSIDE, and its distance from the centre in m.
     """
     best, found = math.inf, OUTSIDE
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, x, y, z)
     r = max(rho / s.spacing, 0.87)
     nx, ny, nz = s.size
-    for a in range(max(math.ceil(u - r), 0), min(math.floor(u + r) + 1, nx)):
-        for b in range(max(math.ceil(v - r), 0), min(math.floor(v + r) + 1, ny)):
-            for c in range(max(math.ceil(w - r), 0), min(math.floor(w + r) + 1, nz)):
+    for a in range(*span(u, r, nx)):
+        for b in range(*span(v, r, ny)):
+            for c in range(*span(w, r, nz)):
                 at = (a * ny + b) * nz + c
                 wrong = s.tau[at] == SOLID if which == 0 else s.allowed[at] == 0
                 if wrong:
