@@ -29,7 +29,7 @@ from systems.common.stopwatch import STOPWATCH
 
 INTEGRATOR = SimulatorConfig(
     integration_scheme="cenic",
-    accuracy=1e-3,
+    accuracy=1e-2,
     max_step_size=0.01,
 )
 """All plants are continuous and stepped by CENIC."""

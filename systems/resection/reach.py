@@ -31,7 +31,7 @@ from systems.resection.volume import CRITICAL, NAMES, TUMOUR, Volume
 ROUND = 20_000
 """Attempts between two looks at what is left."""
 
-WEARY = 1000
+WEARY = 2000
 """Failed attempts after which a voxel is asked for no more, at effort 1."""
 
 STALL = 0.001
@@ -98,7 +98,7 @@ def find_reach(
     wanted = np.flatnonzero(tumour & opening).astype(np.int32)
     tries = np.zeros(len(wanted), np.int32)
     total = int(np.count_nonzero(tumour))
-    patience, weary = max(1, round(16 * effort)), max(1, round(WEARY * effort))
+    patience, weary = max(1, round(32 * effort)), max(1, round(WEARY * effort))
     history = [0]
     while len(wanted):
         tree = grown(tree, ROUND, ROUND)

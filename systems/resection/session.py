@@ -85,7 +85,7 @@ class Session:
 
     volume: Volume
     params: SnakeParams
-    clearance: float = 0.05e-3
+    clearance: float = 0.06e-3
     accuracy: float = 0.02e-3
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
