@@ -143,7 +143,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
     Returns:
-        0 when the scenario ran to its end, 1 when it did not, 2 for bad input.
+        0 when the scenario ran to its end, 1 when it did not, 2 for bad input, 130
+        if it was interrupted before it began.
     """
     logging.getLogger("drake").setLevel(logging.WARNING)
     arguments = make_parser().parse_args(argv)
@@ -159,3 +160,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        print("trocar: interrupted before the run began", file=sys.stderr)
+        return 130

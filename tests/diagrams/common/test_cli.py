@@ -140,3 +140,12 @@ def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     assert 0.2 < log["time"][-1] < 0.4
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     assert "the camera fell off" in metrics["error"]
+
+
+def test_an_interruption_before_the_run_is_no_traceback(monkeypatch, capsys):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("diagrams.common.cli.run_command", interrupted)
+    assert main(["run", "gauze_static"]) == 130
+    assert "interrupted before the run began" in capsys.readouterr().err
