@@ -72,6 +72,12 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
         )
         meshcat.SetTriangleMesh("vessel", vertices.T, faces.T, VESSEL)
     _elementary_volumes(meshcat, animation, run, operation)
+    # The study's view shows 6 cm; a smaller tumour is looked at from nearer.
+    view = run.study.view
+    nearer = min(1.0, float(np.ptp(volume.points(tissue), axis=0).max()) / 0.055)
+    target = nearer * np.array(view.target)
+    away = np.array(view.camera) - np.array(view.target)
+    meshcat.SetCameraPose(target + nearer * away, target)
 
 
 def _in_blocks(
