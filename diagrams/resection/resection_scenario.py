@@ -89,8 +89,8 @@ class ResectionScenario(Scenario):
     spacing: float = 0.5e-3
     margin: float = 1.0e-3
     tracking: float = 0.15e-3
-    clearance: float = 0.06e-3
-    accuracy: float = 0.02e-3
+    clearance: float = 0.075e-3
+    accuracy: float = 0.025e-3
     procedures: list[Procedure] = field(default_factory=list)
     automatic: bool = False
     planner: PlannerParams = field(default_factory=PlannerParams)

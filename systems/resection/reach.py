@@ -34,6 +34,9 @@ ROUND = 20_000
 WEARY = 2000
 """Failed attempts after which a voxel is asked for no more, at effort 1."""
 
+ROOMY = 40.0e-6
+"""A smaller tumour, in m3, is searched longer, up to four times."""
+
 STALL = 0.001
 """A search whose last rounds gain less of the tumour than this has ended."""
 
@@ -98,6 +101,8 @@ def find_reach(
     wanted = np.flatnonzero(tumour & opening).astype(np.int32)
     tries = np.zeros(len(wanted), np.int32)
     total = int(np.count_nonzero(tumour))
+    # Where there is little room the way is harder to find, and a try costs less.
+    effort *= min(max(ROOMY / (total * volume.voxel), 1.0), 4.0)
     patience, weary = max(1, round(32 * effort)), max(1, round(WEARY * effort))
     history = [0]
     while len(wanted):

@@ -85,8 +85,8 @@ class Session:
 
     volume: Volume
     params: SnakeParams
-    clearance: float = 0.06e-3
-    accuracy: float = 0.02e-3
+    clearance: float = 0.075e-3
+    accuracy: float = 0.025e-3
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
     concluded: str = ""
