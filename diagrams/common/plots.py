@@ -6,6 +6,7 @@ from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+import numpy as np
 
 COLORS = {
     "robot": "#1f5fa8",
@@ -38,6 +39,37 @@ def add_axes(figure: Figure, *position: int, **options: Any) -> Any:
     """Adds axes in the project's style; arguments as `Figure.add_subplot`."""
     with rc_context(STYLE):
         return figure.add_subplot(*position, **options)
+
+
+def equal_axes(
+    axes: Any,
+    points: np.ndarray,
+    margin: float = 2.0,
+    elevation: float = 20.0,
+    azimuth: float = -60.0,
+    zoom: float = 1.0,
+) -> None:
+    """Same scale on all three axes of a view in space, round some points.
+
+    Args:
+        axes: 3D axes.
+        points: Positions in mm, (n, 3).
+        margin: About them in mm.
+        elevation: Of the view in degrees.
+        azimuth: Of the view in degrees.
+        zoom: Of the box in its axes.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, half = (low + high) / 2, (high - low).max() / 2 + margin
+    for axis, centre in zip("xyz", middle, strict=True):
+        axes.set(
+            **{
+                f"{axis}lim": (centre - half, centre + half),
+                f"{axis}label": f"{axis} [mm]",
+            }
+        )
+    axes.set_box_aspect((1, 1, 1), zoom=zoom)
+    axes.view_init(elev=elevation, azim=azimuth)
 
 
 def save_figure(figure: Figure, path: Path) -> None:

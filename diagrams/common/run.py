@@ -27,13 +27,6 @@ from diagrams.common.study import Study, build, get_study
 from systems.common.compiled import announced
 from systems.common.stopwatch import STOPWATCH
 
-INTEGRATOR = SimulatorConfig(
-    integration_scheme="cenic",
-    accuracy=1e-2,
-    max_step_size=0.01,
-)
-"""All plants are continuous and stepped by CENIC."""
-
 Progress = Callable[[float, float], None]
 """Called with simulated seconds: those done and all."""
 
@@ -149,7 +142,7 @@ def simulate_diagram(
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
     simulator = Simulator(root)
-    config = study.integrator(scenario) or INTEGRATOR
+    config = study.integrator(scenario)
     ApplySimulatorConfig(config, simulator)
     context = simulator.get_mutable_context()
     root.SetRandomContext(context, RandomGenerator(scenario.seed))

@@ -75,15 +75,40 @@ def export(
         builder.ExportOutput(port_of(systems, source, True), name)
 
 
-def swap(
-    blocks: dict[str, Any], replacements: Mapping[str, Any] | None
+def add_blocks(
+    builder: Any, blocks: Mapping[str, Any], swaps: Mapping[str, Any] | None
 ) -> dict[str, Any]:
-    """The blocks with some replaced by name.
+    """Adds blocks by their names, some of them replaced.
+
+    Returns:
+        What was added.
 
     Raises:
         ValueError: If a replacement has the name of no block.
     """
-    for name in replacements or {}:
+    for name in swaps or {}:
         if name not in blocks:
             raise ValueError(f"no block {name!r} to swap: {nearest(name, blocks)}")
-    return blocks | dict(replacements or {})
+    added = {**blocks, **(swaps or {})}
+    for name, block in added.items():
+        builder.AddNamedSystem(name, block)
+    return added
+
+
+def finish(
+    builder: Any,
+    name: str,
+    systems: Mapping[str, Any],
+    wires: Iterable[tuple[str, str]],
+    signals: Mapping[str, str],
+) -> Any:
+    """Connects all wires, exports all signals, and builds the diagram.
+
+    Raises:
+        ValueError: For a wire or a signal to or from nowhere.
+    """
+    connect(builder, systems, wires)
+    export(builder, systems, signals)
+    diagram = builder.Build()
+    diagram.set_name(name)
+    return diagram

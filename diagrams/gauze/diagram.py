@@ -8,7 +8,7 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
-from diagrams.common.wiring import connect, export, has_input, has_output, swap
+from diagrams.common.wiring import add_blocks, finish, has_input, has_output
 from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
@@ -209,21 +209,13 @@ def make_gauze_diagram(
     """
     builder = DiagramBuilder()
     theatre = add_theatre(builder, scenario)
-    blocks = swap(make_blocks(scenario, theatre.posture), swaps)
-    for name, block in blocks.items():
-        builder.AddNamedSystem(name, block)
+    blocks = add_blocks(builder, make_blocks(scenario, theatre.posture), swaps)
     systems = theatre.systems | blocks
+    wires, exports = [*WIRES], {**EXPORTS}
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
-        connect(builder, systems, [w for w in WIRES if w not in TOLD])
-        connect(builder, systems, EMULATED)
-        export(builder, systems, EXPORTS | WRIST_EXPORTS)
-    else:
-        connect(builder, systems, WIRES)
-        export(builder, systems, EXPORTS)
-    connect(builder, systems, [w for w in EXTRA_WIRES if has_input(systems, w[1])])
-    extra = {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
-    export(builder, systems, extra)
-    diagram = builder.Build()
-    diagram.set_name("gauze_delivery")
-    return diagram
+        wires = [*(w for w in WIRES if w not in TOLD), *EMULATED]
+        exports |= WRIST_EXPORTS
+    wires += [w for w in EXTRA_WIRES if has_input(systems, w[1])]
+    exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    return finish(builder, "gauze_delivery", systems, wires, exports)

@@ -6,27 +6,11 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from diagrams.common import wrist_plots
-from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.gauze.bypass_plots import clearance
 from systems.common.geometry import closest_points
 
 MM = 1e3
-
-
-def _equal_axes(axes: Any, points: np.ndarray) -> None:
-    """Same scale on all three axes, around the given points (n, 3) [mm]."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = (low + high) / 2, (high - low).max() / 2 + 5.0
-    axes.set(
-        xlim=(middle[0] - half, middle[0] + half),
-        ylim=(middle[1] - half, middle[1] + half),
-        zlim=(middle[2] - half, middle[2] + half),
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-        zlabel="z [mm]",
-    )
-    axes.set_box_aspect((1, 1, 1))
-    axes.view_init(elev=22, azim=-60)
 
 
 def _shaft(axes: Any, p_WG: np.ndarray, p_WP: np.ndarray, **style: Any) -> None:
@@ -58,7 +42,12 @@ def trajectory(run: Any) -> Figure:
     _shaft(axes, p_WGS, target[-1], color=COLORS["target"], lw=3, label="target S")
     axes.plot(*obstacle[::marks].T, ".", color=COLORS["obstacle"], ms=3)
     axes.plot(*target[::marks].T, ".", color=COLORS["target"], ms=3)
-    _equal_axes(axes, np.vstack([tip, target, obstacle, [p_WG, p_WGO, p_WGS]]))
+    equal_axes(
+        axes,
+        np.vstack([tip, target, obstacle, [p_WG, p_WGO, p_WGS]]),
+        margin=5.0,
+        elevation=22,
+    )
     axes.legend(loc="upper left")
     axes.set_title(run.scenario.description)
     return figure
@@ -161,7 +150,9 @@ def virtual_force(run: Any) -> Figure:
     ):
         axes.plot(*point[:, None], "o", color="k", ms=3)
         axes.text(*point, f"  ${name}$", fontsize=8)
-    _equal_axes(axes, np.vstack([p_WG, p_WP, p_WGO, p_WO, p_WS]))
+    equal_axes(
+        axes, np.vstack([p_WG, p_WP, p_WGO, p_WO, p_WS]), margin=5.0, elevation=22
+    )
     axes.legend(loc="upper left")
     axes.set_title(f"closest at {run.signals['time'][index]:.2f} s")
     return figure

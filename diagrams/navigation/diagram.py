@@ -8,7 +8,7 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
-from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wiring import add_blocks, finish
 from diagrams.navigation.scenario import NavigationScenario, discs, heading
 from plants.turtlebot.arena import add_arena
 from plants.turtlebot.turtlebot import make_turtlebot
@@ -137,12 +137,6 @@ def make_navigation_diagram(
         goal=scenario.goal,
         floor=floor(scenario),
     )
-    blocks = swap(make_blocks(scenario), swaps)
-    for name, block in blocks.items():
-        builder.AddNamedSystem(name, block)
+    blocks = add_blocks(builder, make_blocks(scenario), swaps)
     systems = {"scene_graph": scene_graph, "arena": arena} | blocks
-    connect(builder, systems, WIRES)
-    export(builder, systems, EXPORTS)
-    diagram = builder.Build()
-    diagram.set_name("navigation")
-    return diagram
+    return finish(builder, "navigation", systems, WIRES, EXPORTS)

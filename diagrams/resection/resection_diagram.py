@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wiring import add_blocks, finish
 from diagrams.resection.resection_scenario import (
     ResectionScenario,
     executed,
@@ -16,7 +15,7 @@ from diagrams.resection.resection_scenario import (
 )
 from diagrams.resection.snake_diagram import DRUM_WIRES, WIRES
 from plants.snake.looks import draw_channel
-from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
+from plants.snake.snake import add_snake, set_default_posture
 from systems.resection.procedure_player import ProcedurePlayer
 from systems.resection.resection_ik import ResectionIk, from_universal
 from systems.resection.snake_location import SnakeLocation
@@ -107,16 +106,7 @@ def make_resection_diagram(
     snake = add_snake(plant, plant.world_frame(), scenario.snake, scenario.drive)
     draw_channel(plant, plant.world_body(), session.volume.channel)
     plant.Finalize()
-    near = session.postures[executed(scenario).posture]
-    start = np.zeros(POSITIONS)
-    start[NEAR], start[FAR] = near, near[1:]
-    plant.SetDefaultPositions(snake.instance, start)
-    blocks = swap(make_blocks(scenario), swaps)
-    for name, block in blocks.items():
-        builder.AddNamedSystem(name, block)
+    set_default_posture(plant, snake, session.postures[executed(scenario).posture])
+    blocks = add_blocks(builder, make_blocks(scenario), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
-    connect(builder, systems, RESECTION_WIRES)
-    export(builder, systems, EXPORTS)
-    diagram = builder.Build()
-    diagram.set_name("resection")
-    return diagram
+    return finish(builder, "resection", systems, RESECTION_WIRES, EXPORTS)

@@ -6,7 +6,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 import numpy as np
 
-from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.resection.resection_metrics import carving_of
 from diagrams.resection.resection_replay import coarse, shown_spacing
 from diagrams.resection.resection_scenario import plan_operation
@@ -49,18 +49,7 @@ def _mesh(axes: Any, mask: np.ndarray, volume: Any, color: str, alpha: float) ->
 
 def _equal(axes: Any, volume: Any) -> None:
     points = volume.points(volume.labels == TUMOUR)[::50] * MM
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, half = (low + high) / 2, (high - low).max() / 2 + 2.0
-    axes.set(
-        xlim=(middle[0] - half, middle[0] + half),
-        ylim=(middle[1] - half, middle[1] + half),
-        zlim=(middle[2] - half, middle[2] + half),
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-        zlabel="z [mm]",
-    )
-    axes.set_box_aspect((1, 1, 1), zoom=0.86)
-    axes.view_init(elev=18, azim=-62)
+    equal_axes(axes, points, elevation=18, azimuth=-62, zoom=0.86)
     axes.invert_zaxis()
 
 

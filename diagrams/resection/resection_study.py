@@ -4,9 +4,7 @@ from pathlib import Path
 from time import time
 from typing import Any
 
-from pydrake.systems.analysis import SimulatorConfig
-
-from diagrams.common.study import Study, View
+from diagrams.common.study import Study, View, cenic
 from diagrams.resection.resection_diagram import make_resection_diagram
 from diagrams.resection.resection_metrics import measure
 from diagrams.resection.resection_plots import plots
@@ -58,13 +56,6 @@ def keep(scenario: ResectionScenario, station: Any, context: Any, ended: bool) -
     save_execution(file, done, plan_operation(scenario).session.postures)
 
 
-def integrator(scenario: ResectionScenario) -> SimulatorConfig:
-    """CENIC with one step a command."""
-    return SimulatorConfig(
-        integration_scheme="cenic", accuracy=1e-3, max_step_size=scenario.period
-    )
-
-
 STUDY = Study(
     name="resection",
     scenario=ResectionScenario,
@@ -76,7 +67,7 @@ STUDY = Study(
     plots=plots,
     decorate=decorate,
     controller="resection_ik",
-    integrator=integrator,
+    integrator=lambda scenario: cenic(scenario.period),  # one step a command
     view=View(camera=(0.055, -0.075, 0.035), target=(0.0, 0.0, 0.014)),
     frame_rate=10.0,
     length=length,

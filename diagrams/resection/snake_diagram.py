@@ -4,15 +4,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wiring import add_blocks, finish
 from diagrams.resection.snake_scenario import ELASTIC_STEP, SnakeScenario
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.looks import draw_channel
-from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
+from plants.snake.snake import add_snake, set_default_posture
 from systems.resection.elastic_wires import ElasticWires
 from systems.resection.resection_ik import ResectionIk, universal
 from systems.resection.snake_location import SnakeLocation
@@ -133,20 +132,10 @@ def make_snake_diagram(
     channel = scenario.snake.body_radius + CHANNEL_CLEARANCE
     draw_channel(plant, plant.world_body(), channel)
     plant.Finalize()
-    near = universal(start_posture(scenario))
-    start = np.zeros(POSITIONS)
-    start[NEAR], start[FAR] = near, near[1:]
-    plant.SetDefaultPositions(snake.instance, start)
-    blocks = swap(make_blocks(scenario), swaps)
-    for name, block in blocks.items():
-        builder.AddNamedSystem(name, block)
-    systems = blocks | {
-        "plant": plant,
-        "scene_graph": scene_graph,
-    }
-    connect(builder, systems, WIRES + (ELASTIC_WIRES if elastic else DRUM_WIRES))
+    set_default_posture(plant, snake, universal(start_posture(scenario)))
+    blocks = add_blocks(builder, make_blocks(scenario), swaps)
+    systems = blocks | {"plant": plant, "scene_graph": scene_graph}
+    wires = WIRES + (ELASTIC_WIRES if elastic else DRUM_WIRES)
     tension = "elastic_wires.tension" if elastic else "wire_tension.tension"
-    export(builder, systems, EXPORTS | {"wires.tension": tension})
-    diagram = builder.Build()
-    diagram.set_name("snake")
-    return diagram
+    exports = EXPORTS | {"wires.tension": tension}
+    return finish(builder, "snake", systems, wires, exports)

@@ -5,7 +5,7 @@ from typing import Any
 from matplotlib.figure import Figure
 import numpy as np
 
-from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.resection.snake_metrics import break_time, errors, judged
 from plants.snake.actuation import wire_lengths
 from plants.snake.kinematics import centreline
@@ -52,18 +52,7 @@ def path(run: Any) -> Figure:
     else:
         axes.plot(*reference.T, lw=3, alpha=0.5, **style)
     axes.plot(*tool.T, color=COLORS["robot"], lw=1.0, label="tip")
-    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
-    middle, half = (low + high) / 2, (high - low).max() / 2 + 2.0
-    axes.set(
-        xlim=(middle[0] - half, middle[0] + half),
-        ylim=(middle[1] - half, middle[1] + half),
-        zlim=(middle[2] - half, middle[2] + half),
-        xlabel="x [mm]",
-        ylabel="y [mm]",
-        zlabel="z [mm]",
-    )
-    axes.set_box_aspect((1, 1, 1))
-    axes.view_init(elev=20, azim=-60)
+    equal_axes(axes, points.reshape(-1, 3))
     axes.legend(loc="upper left")
     axes.set_title(run.scenario.description)
     return figure

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import SimulatorConfig
 
 from diagrams.common.replay import draw_trail
-from diagrams.common.study import Study, View
+from diagrams.common.study import Study, View, cenic
 from diagrams.resection.snake_diagram import make_snake_diagram
 from diagrams.resection.snake_metrics import break_time, measure
 from diagrams.resection.snake_plots import plots
@@ -39,9 +39,7 @@ def integrator(scenario: SnakeScenario) -> SimulatorConfig:
     """CENIC with one step a command; the elastic wires have a discrete plant."""
     if scenario.wires == "elastic":
         return SimulatorConfig()
-    return SimulatorConfig(
-        integration_scheme="cenic", accuracy=1e-3, max_step_size=scenario.period
-    )
+    return cenic(scenario.period)
 
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:

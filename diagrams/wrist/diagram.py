@@ -6,7 +6,7 @@ from typing import Any
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.bedside import add_bedside
-from diagrams.common.wiring import connect, export, swap
+from diagrams.common.wiring import add_blocks, finish
 from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.wrist.scenario import WristScenario
 from systems.auto_guidance.joint_commands import JointCommands
@@ -50,7 +50,8 @@ def make_wrist_diagram(
     bedside = add_bedside(builder, scenario)
     robot = scenario.robot
     guess = [p + e for p, e in zip(robot.p_WG, scenario.first_guess, strict=True)]
-    blocks = swap(
+    blocks = add_blocks(
+        builder,
         {
             "arc_navigation": ArcNavigation(scenario.arcs, robot.p_WP, guess),
             "joint_commands": JointCommands(
@@ -63,11 +64,5 @@ def make_wrist_diagram(
         },
         swaps,
     )
-    for name, block in blocks.items():
-        builder.AddNamedSystem(name, block)
     systems = bedside.systems | add_wrist(builder, bedside, scenario) | blocks
-    connect(builder, systems, WIRES)
-    export(builder, systems, EXPORTS)
-    diagram = builder.Build()
-    diagram.set_name("passive_wrist")
-    return diagram
+    return finish(builder, "passive_wrist", systems, WIRES, EXPORTS)

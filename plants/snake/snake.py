@@ -12,6 +12,7 @@ torsion-free plate, which moves nothing that the wires or the next module see;
 wires are drawn from the torsion-free pose (`wire_path`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -98,6 +99,19 @@ def add_snake(
     for k in range(1, MODULES + 1):
         chain.add_module(k)
     return Snake(instance, chain.add_tool(), params, drive)
+
+
+def set_default_posture(plant: Any, snake: Snake, x: Sequence[float]) -> None:
+    """Makes a posture the one that a plant's new contexts begin with.
+
+    Args:
+        plant: The finalized plant.
+        snake: What `add_snake` added to it.
+        x: The posture as s, a1, b1, ..., b3, (7,).
+    """
+    q = np.zeros(POSITIONS)
+    q[NEAR], q[FAR] = x, x[1:]
+    plant.SetDefaultPositions(snake.instance, q)
 
 
 class _Chain:

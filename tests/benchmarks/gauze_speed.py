@@ -22,8 +22,9 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.common.run import INTEGRATOR, Run, build, rehearse, simulate
+from diagrams.common.run import Run, build, rehearse, simulate
 from diagrams.common.scenario import load_scenario
+from diagrams.common.study import cenic
 from diagrams.gauze.theatre import add_theatre
 from systems.common.stopwatch import STOPWATCH
 
@@ -45,9 +46,9 @@ class Share:
 
 def timed(system: Any, context: Any, duration: float) -> float:
     """Wall seconds per simulated second of a system's advance."""
-    rehearse(system, context, INTEGRATOR, 0.05)
+    rehearse(system, context, cenic(), 0.05)
     simulator = Simulator(system, context)
-    ApplySimulatorConfig(INTEGRATOR, simulator)
+    ApplySimulatorConfig(cenic(), simulator)
     simulator.Initialize()
     STOPWATCH.reset()
     gc.disable()
