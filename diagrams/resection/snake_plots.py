@@ -66,6 +66,7 @@ def pose_errors(run: Any) -> Figure:
     upper = add_axes(figure, 2, 1, 1)
     upper.semilogy(time, position * MM, color=COLORS["robot"], lw=1.0)
     upper.set(ylabel="tip error [mm]", xlim=(0, time[-1]))
+    upper.set_ylim(bottom=max(1e-4, upper.get_ylim()[0]))  # it starts without any
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     lower.semilogy(time, np.degrees(angle), color=COLORS["target"], lw=1.0)
     lower.set(ylabel="axis error [deg]", xlabel="time [s]")
