@@ -128,7 +128,7 @@ def diagram_command(arguments: argparse.Namespace) -> int:
 
 def resect_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar resect`."""
-    from diagrams.resection.resect_cli import run_console
+    from diagrams.resection.console import run_console
 
     scenario = load_scenario(arguments.name, arguments.overrides)
     if scenario.system != "resection":

@@ -14,8 +14,8 @@ STUDIES = {
     "gauze": "diagrams.gauze.study",
     "navigation": "diagrams.navigation.study",
     "wrist": "diagrams.wrist.study",
-    "snake": "diagrams.resection.snake_study",
-    "resection": "diagrams.resection.resection_study",
+    "snake": "diagrams.snake.study",
+    "resection": "diagrams.resection.study",
 }
 """A scenario's `system` and the module whose `STUDY` runs it."""
 

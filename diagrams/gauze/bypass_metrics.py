@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.common.run import simulate
-from systems.auto_guidance.hunting_tool import Hunt
+from plants.surgeon.hunting_tool import Hunt
 
 HAND_OVER = 0.02
 """The robot hands over while its tip is this near to S's tip; S may be touched [m]."""

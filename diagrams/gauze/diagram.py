@@ -8,24 +8,24 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
+from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
-from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
+from plants.surgeon.hunting_tool import HuntingTool
+from plants.surgeon.surgeon_tool import SurgeonTool
 from systems.auto_guidance.backward_movement import BackwardMovement
-from systems.auto_guidance.clearance_constraint import ClearanceConstraint
-from systems.auto_guidance.endoscope import Endoscope
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
 from systems.auto_guidance.go_to_target import GoToTarget
-from systems.auto_guidance.hunting_tool import HuntingTool
-from systems.auto_guidance.joint_commands import JointCommands
-from systems.auto_guidance.optical_tracker import OpticalTracker
-from systems.auto_guidance.robot_location import RobotLocation
-from systems.auto_guidance.surgeon_tool import SurgeonTool
-from systems.auto_guidance.tool_bypass import ToolBypass
-from systems.auto_guidance.tool_navigation import ToolNavigation
-from systems.auto_guidance.trajectory_estimator import TrajectoryEstimator
 from systems.auto_guidance.velocity_corrections import VelocityCorrections
+from systems.bypass.clearance_constraint import ClearanceConstraint
+from systems.bypass.tool_bypass import ToolBypass
+from systems.motion.endoscope import Endoscope
+from systems.motion.joint_commands import JointCommands
+from systems.motion.tool_navigation import ToolNavigation
+from systems.sensing.optical_tracker import OpticalTracker
+from systems.sensing.robot_location import RobotLocation
+from systems.sensing.trajectory_estimator import TrajectoryEstimator
 
 WIRES = (
     # The surgeon's tools are seen by the tracker; estimators make sense of it.

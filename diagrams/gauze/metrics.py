@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.common.wrist_metrics import wrist_figures
+from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
-from systems.auto_guidance.tool_navigation import REASONS, WAITING
+from systems.motion.tool_navigation import REASONS, WAITING
 
 REACHED_DISTANCE = 0.002
 """The gauze is delivered while the tip is this close to S's true tip [m] ..."""

@@ -5,7 +5,7 @@ from typing import Any
 from matplotlib.figure import Figure
 import numpy as np
 
-from diagrams.common import wrist_plots
+from diagrams.bedside import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.gauze.bypass_plots import clearance
 from systems.common.geometry import closest_points

@@ -5,32 +5,32 @@ import math
 
 import numpy as np
 
+from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError, nearest
-from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
+from plants.surgeon.hunting_tool import Hunt
+from plants.surgeon.recording import load_recording
+from plants.surgeon.surgeon_tool import SurgeonToolParams
 from systems.auto_guidance.backward_movement import BackwardMovementParams
-from systems.auto_guidance.clearance_constraint import ClearanceConstraintParams
-from systems.auto_guidance.endoscope import EndoscopeParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams
-from systems.auto_guidance.hunting_tool import Hunt
-from systems.auto_guidance.joint_commands import JointCommandsParams
-from systems.auto_guidance.obstacle_tools import Margins
-from systems.auto_guidance.optical_tracker import OpticalTrackerParams
-from systems.auto_guidance.recording import load_recording
-from systems.auto_guidance.surgeon_tool import SurgeonToolParams
-from systems.auto_guidance.tool_bypass import ToolBypassParams
-from systems.auto_guidance.tool_navigation import (
+from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
+from systems.bypass.clearance_constraint import ClearanceConstraintParams
+from systems.bypass.obstacle_tools import Margins
+from systems.bypass.tool_bypass import ToolBypassParams
+from systems.bypass.workspace import WorkspaceParams
+from systems.motion.endoscope import EndoscopeParams
+from systems.motion.joint_commands import JointCommandsParams
+from systems.motion.tool_navigation import (
     ToolNavigationParams,
     cone_angle,
     constants,
     reachable,
 )
-from systems.auto_guidance.trajectory_estimator import TrajectoryEstimatorParams
-from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
-from systems.auto_guidance.workspace import WorkspaceParams
+from systems.sensing.optical_tracker import OpticalTrackerParams
+from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 
 @dataclass

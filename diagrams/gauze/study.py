@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.common.bedside import stiffen
+from diagrams.bedside.bedside import stiffen
+from diagrams.bedside.wrist import WRIST_SIGNALS
+from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
-from diagrams.common.wrist import WRIST_SIGNALS
-from diagrams.common.wrist_replay import decorate_wrist
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.plots import plots

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from diagrams.common.bedside import Bedside, add_bedside
+from diagrams.bedside.bedside import Bedside, add_bedside
 from plants.instruments.clearance import add_clearance
 from plants.instruments.posed_tools import PosedToolsParams, add_posed_tools
 

@@ -10,12 +10,12 @@ from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.navigation.scenario import NavigationScenario, discs, heading
+from plants.crowd.crowd_motion import CrowdMotion
+from plants.crowd.obstacle_motion import ObstacleMotion, ObstacleParams
 from plants.turtlebot.arena import add_arena
 from plants.turtlebot.turtlebot import make_turtlebot
 from systems.switching.classical_planner import ClassicalPlanner
-from systems.switching.crowd_motion import CrowdMotion
 from systems.switching.navigation_planner import PERIOD
-from systems.switching.obstacle_motion import ObstacleMotion, ObstacleParams
 from systems.switching.perception import Perception
 from systems.switching.statechart_planner import StatechartPlanner
 from systems.switching.switching_planner import SwitchingPlanner

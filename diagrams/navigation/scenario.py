@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from math import atan2, hypot, isfinite
 
 from diagrams.common.scenario import Scenario, ScenarioError, nearest
+from plants.crowd.crowd_motion import CrowdParams, starts
+from plants.crowd.obstacle_motion import ObstacleParams, place_and_velocity
 from plants.turtlebot.turtlebot import TurtlebotParams
 from systems.switching.classical_planner import ClassicalParams
-from systems.switching.crowd_motion import CrowdParams, starts
-from systems.switching.obstacle_motion import ObstacleParams, place_and_velocity
 from systems.switching.perception import PerceptionParams
 from systems.switching.statechart_planner import StatechartParams
 from systems.switching.switching_state import SwitchingParams

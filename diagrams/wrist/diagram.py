@@ -5,13 +5,13 @@ from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.common.bedside import add_bedside
+from diagrams.bedside.bedside import add_bedside
+from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.common.wiring import add_blocks, finish
-from diagrams.common.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.wrist.scenario import WristScenario
-from systems.auto_guidance.joint_commands import JointCommands
-from systems.auto_guidance.robot_location import RobotLocation
+from systems.motion.joint_commands import JointCommands
 from systems.passive_wrist.arc_navigation import ArcNavigation
+from systems.sensing.robot_location import RobotLocation
 
 WIRES = (
     *WRIST_WIRES,

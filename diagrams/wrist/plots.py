@@ -5,7 +5,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from diagrams.common.wrist_plots import estimate, forces
+from diagrams.bedside.wrist_plots import estimate, forces
 
 UNLIMITED = 1e3
 """Force limit in N of the comparisons that cannot relax the wall."""

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, field
 
+from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
-from diagrams.common.wrist import WristSettings, check_wrist
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
-from systems.auto_guidance.joint_commands import JointCommandsParams
+from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.arc_navigation import ArcParams
 from systems.passive_wrist.wrist_law import MODES
 

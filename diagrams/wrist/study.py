@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from diagrams.common.bedside import stiffen
+from diagrams.bedside.bedside import stiffen
+from diagrams.bedside.wrist import WRIST_SIGNALS
+from diagrams.bedside.wrist_metrics import wrist_figures
+from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
-from diagrams.common.wrist import WRIST_SIGNALS
-from diagrams.common.wrist_metrics import wrist_figures
-from diagrams.common.wrist_replay import decorate_wrist
 from diagrams.wrist.diagram import make_wrist_diagram
 from diagrams.wrist.plots import plots
 from diagrams.wrist.scenario import WristScenario, check

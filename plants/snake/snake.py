@@ -83,7 +83,7 @@ def add_snake(
         params: Geometry.
         drive: Masses and gains.
         elastic: Without springs on the modules' angles: wires of their own
-            (`systems.resection.elastic_wires`) hold them.
+            (`plants.snake.elastic_wires`) hold them.
 
     Returns:
         Instance, tool frame and parameters.

@@ -17,13 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from systems.auto_guidance.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    fulcrum,
-    usable,
-    velocity,
-)
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
@@ -33,6 +26,13 @@ from systems.common.geometry import (
     sub,
     unit,
     xyz,
+)
+from systems.common.signals import (
+    GUIDE_EXAMPLE,
+    OBSTACLE_EXAMPLE,
+    fulcrum,
+    usable,
+    velocity,
 )
 from systems.common.step_block import StepBlock
 

@@ -32,13 +32,6 @@ from typing import Any
 import numpy as np
 
 from systems.auto_guidance.backward_movement import contact_velocity
-from systems.auto_guidance.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
-    usable,
-)
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
@@ -52,6 +45,13 @@ from systems.common.geometry import (
     sub,
     unit,
     xyz,
+)
+from systems.common.signals import (
+    GUIDE_EXAMPLE,
+    OBSTACLE_EXAMPLE,
+    ROBOT_TOOL_EXAMPLE,
+    TARGET_EXAMPLE,
+    usable,
 )
 from systems.common.step_block import StepBlock
 

@@ -35,14 +35,6 @@ from typing import Any
 
 import numpy as np
 
-from systems.auto_guidance.signals import (
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
-    fulcrum,
-    usable,
-    velocity,
-)
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
     Vector,
@@ -57,6 +49,14 @@ from systems.common.geometry import (
     sub,
     unit,
     xyz,
+)
+from systems.common.signals import (
+    OBSTACLE_EXAMPLE,
+    ROBOT_TOOL_EXAMPLE,
+    TARGET_EXAMPLE,
+    fulcrum,
+    usable,
+    velocity,
 )
 from systems.common.step_block import StepBlock
 

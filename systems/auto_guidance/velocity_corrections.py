@@ -21,14 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from systems.auto_guidance.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    acceleration,
-    fulcrum,
-    usable,
-    velocity,
-)
 from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
@@ -42,6 +34,14 @@ from systems.common.geometry import (
     sub,
     unit,
     xyz,
+)
+from systems.common.signals import (
+    GUIDE_EXAMPLE,
+    OBSTACLE_EXAMPLE,
+    acceleration,
+    fulcrum,
+    usable,
+    velocity,
 )
 
 DISTANCES = ["Z", "AZ", "M", "F", "VF"]

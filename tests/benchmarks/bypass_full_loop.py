@@ -16,7 +16,7 @@ import numpy as np
 
 from diagrams.common.run import simulate
 from diagrams.common.scenario import load_scenario
-from systems.auto_guidance.recording import save_recording
+from plants.surgeon.recording import save_recording
 from tests.benchmarks.crossed_scenes import Scene, scene
 
 MAX_TILT = 0.6

@@ -13,13 +13,13 @@ from systems.auto_guidance import (
     workspace,
 )
 from systems.auto_guidance.backward_movement import BackwardMovementParams
-from systems.auto_guidance.bypass_route import up_and_over
-from systems.auto_guidance.clearance_constraint import ClearanceConstraintParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams, guide_point
-from systems.auto_guidance.obstacle_tools import Margins
-from systems.auto_guidance.tool_bypass import ToolBypassParams
-from systems.auto_guidance.workspace import WorkspaceParams
+from systems.bypass.bypass_route import up_and_over
+from systems.bypass.clearance_constraint import ClearanceConstraintParams
+from systems.bypass.obstacle_tools import Margins
+from systems.bypass.tool_bypass import ToolBypassParams
+from systems.bypass.workspace import WorkspaceParams
 from systems.common.geometry import Vector, along, limited, sub
 from tests.benchmarks.kinematic_loop import LocalPlanner, Planner, Robot
 

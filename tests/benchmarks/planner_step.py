@@ -16,12 +16,12 @@ from pydrake.systems.primitives import ConstantVectorSource
 from systems.auto_guidance.backward_movement import BackwardMovement
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
 from systems.auto_guidance.go_to_target import GoToTarget, GoToTargetParams
-from systems.auto_guidance.signals import (
+from systems.auto_guidance.velocity_corrections import VelocityCorrections
+from systems.common.signals import (
     OBSTACLE_EXAMPLE,
     ROBOT_TOOL_EXAMPLE,
     TARGET_EXAMPLE,
 )
-from systems.auto_guidance.velocity_corrections import VelocityCorrections
 
 
 def add_planner(builder: DiagramBuilder, ports: dict[str, Any]) -> dict[str, Any]:

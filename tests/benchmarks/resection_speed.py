@@ -6,14 +6,14 @@ from time import process_time
 import numpy as np
 
 from plants.snake.parameters import SnakeParams
-from systems.resection.feasibility_map import feasibility_map
-from systems.resection.planner import Planner
-from systems.resection.procedure import Procedure
-from systems.resection.reach import find_reach
-from systems.resection.session import Session
-from systems.resection.sweep import intermediate
-from systems.resection.tissue import SyntheticTumour, synthetic_tumour
-from systems.resection.volume import Access, make_volume
+from plants.tissue.tissue import SyntheticTumour, synthetic_tumour
+from plants.tissue.volume import Access, make_volume
+from systems.resection.planning.feasibility_map import feasibility_map
+from systems.resection.planning.planner import Planner
+from systems.resection.planning.procedure import Procedure
+from systems.resection.planning.reach import find_reach
+from systems.resection.planning.session import Session
+from systems.resection.planning.sweep import intermediate
 
 LENGTH = 0.058
 """Of the tumour's bounding box in m: some 65 cm3."""

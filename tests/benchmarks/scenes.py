@@ -13,7 +13,7 @@ from math import cos, hypot, pi, sin
 import numpy as np
 from scipy import ndimage
 
-from systems.switching.orca import orca_towards
+from plants.crowd.orca import orca_towards
 
 Frame = list[tuple[float, float, float, float, float]]
 """x, y [m], radius [m], v_x, v_y [m/s] of every obstacle at one instant."""

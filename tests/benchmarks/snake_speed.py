@@ -25,7 +25,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.common.run import simulate
 from diagrams.common.scenario import load_scenario
-from diagrams.resection.snake_scenario import ELASTIC_STEP
+from diagrams.snake.scenario import ELASTIC_STEP
 from plants.snake.actuation import bends_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.inverse_kinematics import positioning, tool_postures
@@ -33,8 +33,8 @@ from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
 from plants.snake.tension import tensions
-from systems.resection.resection_ik import universal
-from systems.resection.tip_reference import reference
+from systems.resection.wires.resection_ik import universal
+from systems.resection.wires.tip_reference import reference
 from tests.benchmarks.snake_mujoco import model_xml
 
 PARAMS, DRIVE = SnakeParams(), SnakeDriveParams()

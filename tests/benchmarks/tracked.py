@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from systems.auto_guidance import trajectory_estimator
-from systems.auto_guidance.optical_tracker import OpticalTrackerParams, disturb
-from systems.auto_guidance.trajectory_estimator import TrajectoryEstimatorParams
 from systems.common.geometry import sub, unit, xyz
+from systems.sensing import trajectory_estimator
+from systems.sensing.optical_tracker import OpticalTrackerParams, disturb
+from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 
 def tracked(

@@ -24,7 +24,7 @@ OTHERS = "_calc_wrench", "_calc_shaft"
 
 def report(seed: int, scenes: int) -> str:
     """Times the blocks' calculations, what they pull from others taken away."""
-    from systems.passive_wrist.tool_wrench import ToolWrench
+    from systems.sensing.tool_wrench import ToolWrench
 
     own: dict[float, float] = defaultdict(float)
     inner: list[float] = []

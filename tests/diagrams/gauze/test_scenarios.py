@@ -13,7 +13,7 @@ from diagrams.common.replay import start_meshcat
 from diagrams.common.run import Run, run_scenario, simulate
 from diagrams.common.scenario import ScenarioError, load_scenario
 from diagrams.gauze.metrics import spans, stops, time_to_target
-from systems.auto_guidance.recording import save_recording
+from plants.surgeon.recording import save_recording
 
 KEYS = {
     *("reached", "time_to_target", "final_tip_error", "min_tool_clearance"),

@@ -12,11 +12,11 @@ import pytest
 from diagrams.common.cli import main
 from diagrams.common.run import run_scenario, simulate
 from diagrams.common.scenario import ScenarioError, load_scenario
-from diagrams.resection.resection_scenario import plan_operation
-from systems.resection.archive import beside
-from systems.resection.execution import Execution, load_execution, save_execution
-from systems.resection.reach import load_reach
-from systems.resection.session import load_session
+from diagrams.resection.scenario import plan_operation
+from plants.tissue.execution import Execution, load_execution, save_execution
+from systems.common.archive import beside
+from systems.resection.planning.reach import load_reach
+from systems.resection.planning.session import load_session
 
 
 @pytest.fixture(scope="module")

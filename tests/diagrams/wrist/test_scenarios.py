@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from diagrams.bedside.wrist_metrics import last_above, settled
 from diagrams.common.run import Run, simulate
 from diagrams.common.scenario import ScenarioError, load_scenario
-from diagrams.common.wrist_metrics import last_above, settled
 
 
 @functools.cache

@@ -11,7 +11,7 @@ from systems.auto_guidance.backward_movement import (
     BackwardMovement,
     BackwardMovementParams,
 )
-from systems.auto_guidance.signals import GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
+from systems.common.signals import GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
 from tests.loosely import loosely
 
 backward_movement = loosely(module.backward_movement, module.constants)

@@ -17,7 +17,7 @@ from systems.auto_guidance.fuzzy_arbiter import (
     FuzzyArbiter,
     FuzzyArbiterParams,
 )
-from systems.auto_guidance.signals import (
+from systems.common.signals import (
     GUIDE_EXAMPLE,
     OBSTACLE_EXAMPLE,
     ROBOT_TOOL_EXAMPLE,

@@ -9,7 +9,7 @@ import pytest
 
 from systems.auto_guidance import go_to_target as module
 from systems.auto_guidance.go_to_target import GoToTarget, GoToTargetParams
-from systems.auto_guidance.signals import (
+from systems.common.signals import (
     OBSTACLE_EXAMPLE,
     ROBOT_TOOL_EXAMPLE,
     TARGET_EXAMPLE,

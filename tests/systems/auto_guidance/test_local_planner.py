@@ -13,8 +13,8 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 import pytest
 
+from plants.surgeon.surgeon_tool import SurgeonToolParams, tip_motion
 from systems.auto_guidance.go_to_target import GoToTargetParams
-from systems.auto_guidance.surgeon_tool import SurgeonToolParams, tip_motion
 from systems.common import geometry
 from systems.common.geometry import norm
 from tests.benchmarks.crossed_scenes import CONTACT

@@ -7,7 +7,6 @@ import pytest
 import skfuzzy
 
 from systems.auto_guidance import velocity_corrections as module
-from systems.auto_guidance.signals import OBSTACLE_EXAMPLE
 from systems.auto_guidance.velocity_corrections import (
     DISTANCES,
     SPEEDS,
@@ -17,6 +16,7 @@ from systems.auto_guidance.velocity_corrections import (
     VelocityCorrectionsParams,
 )
 from systems.common import geometry
+from systems.common.signals import OBSTACLE_EXAMPLE
 from tests.loosely import loosely
 
 closest_on_segment = loosely(geometry.closest_on_segment)

@@ -3,9 +3,9 @@
 import pytest
 
 from plants.snake.parameters import SnakeParams
-from systems.resection.session import Session
-from systems.resection.tissue import SyntheticTumour, Tissue, synthetic_tumour
-from systems.resection.volume import Access, make_volume
+from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
+from plants.tissue.volume import Access, make_volume
+from systems.resection.planning.session import Session
 
 
 @pytest.fixture(scope="session")

@@ -5,18 +5,18 @@ from math import hypot, nan, pi
 import numpy as np
 import pytest
 
+from plants.crowd.crowd_motion import CrowdMotion, CrowdParams, starts
+from plants.crowd.obstacle_motion import (
+    ObstacleMotion,
+    ObstacleParams,
+    place_and_velocity,
+)
+from plants.crowd.orca import orca_towards, orca_velocity
 from systems.switching.classical_planner import (
     ClassicalParams,
     ClassicalPlanner,
     summed_fields,
 )
-from systems.switching.crowd_motion import CrowdMotion, CrowdParams, starts
-from systems.switching.obstacle_motion import (
-    ObstacleMotion,
-    ObstacleParams,
-    place_and_velocity,
-)
-from systems.switching.orca import orca_towards, orca_velocity
 from systems.switching.perception import PerceptionParams, perceive
 from systems.switching.unicycle_control import UnicycleControlParams, heading_law
 

@@ -1,0 +1,147 @@
+"""Figure 2's "passive wrist emulation control", for every diagram that has an arm."""
+
+from dataclasses import dataclass, field, replace
+import logging
+from typing import Any
+
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.bedside.bedside import Bedside
+from diagrams.common.scenario import ScenarioError
+from plants.abdomen.wall_motion import WallMotionParams
+from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator, FulcrumParams
+from systems.passive_wrist.passive_wrist_emulation import (
+    PassiveWristEmulation,
+    WristParams,
+)
+from systems.passive_wrist.wrist_law import MODES
+from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
+
+WRIST_WIRES = (
+    ("tool_wrench.shaft", "fulcrum_estimator.shaft"),
+    ("tool_wrench.wrench", "fulcrum_estimator.wrench"),
+    ("tool_wrench.shaft", "passive_wrist.shaft"),
+    ("tool_wrench.wrench", "passive_wrist.wrench"),
+    ("fulcrum_estimator.estimate", "passive_wrist.estimate"),
+    ("wall_force.fulcrum", "passive_wrist.true_fulcrum"),
+    ("passive_wrist.tool", "joint_commands.tool"),
+)
+"""Sensor, estimator and emulation; the task's tool goes to `tool_wanted`."""
+
+WRIST_EXPORTS = {
+    "wrist.fulcrum": "fulcrum_estimator.estimate",
+    "wrist.covariance": "fulcrum_estimator.covariance",
+    "wrist.pivot": "passive_wrist.pivot",
+    "wrist.permission": "passive_wrist.permission",
+    "wrist.wrench": "tool_wrench.wrench",
+    "wrist.shaft": "tool_wrench.shaft",
+    "wall.fulcrum": "wall_force.fulcrum",
+}
+"""What can be logged of it."""
+
+WRIST_SIGNALS = {
+    "wrist.fulcrum": (
+        *("x", "y", "z", "vx", "vy", "vz", "sigma_across", "sigma_along"),
+        *("stiffness", "sigma_ln_stiffness", "rate", "phase", "jumps", "refused"),
+    ),
+    "wrist.covariance": tuple(f"{a}{b}" for a in "xyz" for b in "xyz"),
+    "wrist.pivot": ("x", "y", "z"),
+    "wrist.permission": ("speed_scale", "code"),
+    "wrist.wrench": ("fx", "fy", "fz", "mx", "my", "mz", "valid"),
+    "wrist.shaft": (
+        *("px", "py", "pz", "ux", "uy", "uz"),
+        *("vx", "vy", "vz", "dux", "duy", "duz"),
+    ),
+    "wall.fulcrum": ("x", "y", "z", "vx", "vy", "vz"),
+}
+"""Columns of the log."""
+
+
+@dataclass
+class WristSettings:
+    """What a scenario says of the wrist and the wall.
+
+    Attributes:
+        wrist: `pwe`, `spring`, `off` or `known`.
+        first_guess: Error of the first guess of the fulcrum, in W [m].
+    """
+
+    wrist: str = "known"
+    first_guess: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    wall_motion: WallMotionParams = field(default_factory=WallMotionParams)
+    tool_wrench: ToolWrenchParams = field(default_factory=ToolWrenchParams)
+    fulcrum_estimator: FulcrumParams = field(default_factory=FulcrumParams)
+    passive_wrist: WristParams = field(default_factory=WristParams)
+
+
+def check_wrist(scenario: Any) -> None:
+    """Raises ScenarioError for wrist settings that do not go together."""
+    if scenario.wrist not in MODES:
+        raise ScenarioError(f"wrist={scenario.wrist!r}: choose from {', '.join(MODES)}")
+    guess = scenario.first_guess
+    if len(guess) != 3 or not all(abs(x) <= 0.05 for x in guess):
+        raise ScenarioError(
+            f"first_guess={guess}: expected 3 numbers of at most 0.05 m"
+        )
+    period = scenario.joints.period
+    for name in ("tool_wrench", "fulcrum_estimator", "passive_wrist"):
+        own = getattr(scenario, name).period
+        if abs(own - period) > 1e-9:
+            raise ScenarioError(
+                f"{name}.period={own} s: expected joints.period={period} s; sensor, "
+                "estimator, wrist and joints share their instants"
+            )
+
+
+def _not_of_joint_limits(record: logging.LogRecord) -> bool:
+    """Whether a log record is not Drake's warning of joint limits.
+
+    A reaction force is asked of the continuous plant's forward dynamics, which
+    knows no joint limits and says so once. CENIC, which moves the arm, knows them,
+    and the joints' commands keep away from them.
+    """
+    return "does not handle joint limits" not in record.getMessage()
+
+
+def add_wrist(
+    builder: DiagramBuilder, bedside: Bedside, scenario: Any
+) -> dict[str, Any]:
+    """Adds sensor, estimator and emulation; wire them with `WRIST_WIRES`.
+
+    Args:
+        builder: The diagram's builder.
+        bedside: The plant's parts.
+        scenario: Has the fields of `WristSettings`, `robot` and `instrument`.
+
+    Returns:
+        The systems by name.
+
+    Raises:
+        ValueError: If a parameter makes no sense or the sensor's frame is not there.
+    """
+    logging.getLogger("drake").addFilter(_not_of_joint_limits)
+    guess = [
+        p + e for p, e in zip(scenario.robot.p_WG, scenario.first_guess, strict=True)
+    ]
+    sensor = replace(scenario.tool_wrench, seed=scenario.seed)
+    estimator = replace(
+        scenario.fulcrum_estimator,
+        guess=guess,
+        length=scenario.instrument.length,
+        latency=sensor.delay * sensor.period if sensor.aligned else 0.0,
+    )
+    wrist = replace(scenario.passive_wrist, mode=scenario.wrist, guess=guess)
+    systems = {
+        "tool_wrench": add_tool_wrench(
+            builder,
+            bedside.systems["plant"],
+            sensor,
+            scenario.instrument,
+            bedside.abdomen,
+        ),
+        "fulcrum_estimator": FulcrumEstimator(estimator),
+        "passive_wrist": PassiveWristEmulation(wrist),
+    }
+    for name in ("fulcrum_estimator", "passive_wrist"):
+        builder.AddNamedSystem(name, systems[name])
+    return systems

@@ -1,0 +1,112 @@
+"""The diagram of a resection: plan, tool poses, wires, snake, and tissue that goes."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.common.wiring import add_blocks, finish
+from diagrams.resection.scenario import (
+    ResectionScenario,
+    executed,
+    plan_operation,
+)
+from diagrams.snake.diagram import DRUM_WIRES, WIRES
+from plants.snake.looks import draw_channel
+from plants.snake.snake import add_snake, set_default_posture
+from plants.tissue.tissue_carver import Carving, TissueCarver
+from systems.resection.wires.procedure_player import ProcedurePlayer
+from systems.resection.wires.resection_ik import ResectionIk, from_universal
+from systems.resection.wires.snake_location import SnakeLocation
+from systems.resection.wires.wire_drums import WireDrums
+from systems.resection.wires.wire_forward_actuation import WireForwardActuation
+from systems.resection.wires.wire_inverse_actuation import (
+    WireInverseActuation,
+    wound_lengths,
+)
+from systems.resection.wires.wire_tension import WireTension
+from systems.resection.wires.wire_watch import WireWatch
+
+RESECTION_WIRES = (
+    ("procedure_player.target", "resection_ik.target"),
+    *(wire for wire in WIRES if not wire[0].startswith("tip_reference")),
+    *DRUM_WIRES,
+    # What the tool's true path removes.
+    ("snake_location.posture", "tissue_carver.posture"),
+)
+
+EXPORTS = {
+    "tip.reference": "procedure_player.reference",
+    "plan.progress": "procedure_player.progress",
+    "snake.tool": "snake_location.tool",
+    "snake.posture": "snake_location.posture",
+    "ik.status": "resection_ik.status",
+    "drums.limited": "wire_drums.limited",
+    "wires.tension": "wire_tension.tension",
+    "tissue.index": "tissue_carver.index",
+    "tissue.removed": "tissue_carver.removed",
+    "tissue.touched": "tissue_carver.touched",
+    "tissue.way": "tissue_carver.way",
+    "watch.alarm": "wire_watch.alarm",
+    "scene_graph.query": "scene_graph.query",
+}
+
+
+def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
+    """The blocks of the diagram, by the names that the wires use."""
+    s = scenario
+    session = plan_operation(s).session
+    postures, done = session.postures, executed(s)
+    start = from_universal(postures[done.posture].tolist())
+    lengths = wound_lengths(start, s.inverse_actuation, s.snake, s.drive)
+    return {
+        "procedure_player": ProcedurePlayer(
+            replace(s.player, lead=s.period), s.snake, postures, done.posture
+        ),
+        "resection_ik": ResectionIk(
+            replace(s.resection_ik, period=s.period), s.snake, start
+        ),
+        "wire_inverse_actuation": WireInverseActuation(
+            s.inverse_actuation, s.snake, s.drive
+        ),
+        "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
+        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "snake_location": SnakeLocation(s.snake),
+        "wire_watch": WireWatch(replace(s.watch, period=s.period)),
+        "wire_tension": WireTension(s.tension, s.snake),
+        "tissue_carver": TissueCarver(
+            replace(s.carver, period=s.period),
+            s.snake,
+            Carving(session.volume, s.snake, done),
+            start,
+        ),
+    }
+
+
+def make_resection_diagram(
+    scenario: ResectionScenario, swaps: Mapping[str, Any] | None = None
+) -> Any:
+    """Plans a scenario and makes the diagram that carries the plan out.
+
+    Args:
+        scenario: The parameters.
+        swaps: Systems that replace blocks of the same name and ports.
+
+    Returns:
+        The diagram, its signals exported as `model.signal`.
+
+    Raises:
+        ValueError: If a parameter makes no sense, or a swap has no place.
+    """
+    session = plan_operation(scenario).session
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    snake = add_snake(plant, plant.world_frame(), scenario.snake, scenario.drive)
+    draw_channel(plant, plant.world_body(), session.volume.channel)
+    plant.Finalize()
+    set_default_posture(plant, snake, session.postures[executed(scenario).posture])
+    blocks = add_blocks(builder, make_blocks(scenario), swaps)
+    systems = blocks | {"plant": plant, "scene_graph": scene_graph}
+    return finish(builder, "resection", systems, RESECTION_WIRES, EXPORTS)

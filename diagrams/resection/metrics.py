@@ -1,0 +1,64 @@
+"""The figures of a resection: what was planned, and what was really done."""
+
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from diagrams.resection.scenario import plan_operation
+from plants.tissue.space import SOLID
+from plants.tissue.volume import BRAIN, CRITICAL
+
+
+def carving_of(run: Any) -> Any:
+    """The executed tissue of a run (`plants.tissue.tissue_carver.Carving`)."""
+    station = run.diagram.GetSubsystemByName("station")
+    return station.GetSubsystemByName("tissue_carver").carving
+
+
+def outside_depth(volume: Any) -> float:
+    """How deep into healthy tissue anything was removed, outside the channel, in m."""
+    wrong = (volume.tau != SOLID) & np.isin(volume.labels, (BRAIN, CRITICAL))
+    if not wrong.any():
+        return 0.0
+    healthy = np.isin(volume.labels, (BRAIN, CRITICAL))
+    depth = ndimage.distance_transform_edt(healthy)
+    return float(depth[wrong].max() * volume.spacing)
+
+
+def measure(run: Any) -> dict[str, Any]:
+    """The figures of a run, as `metrics.json` keeps them."""
+    operation = plan_operation(run.scenario)
+    session, reach = operation.session, operation.reach
+    removed = run.matrix("tissue.removed")[-1]
+    hits, nearest = run.matrix("tissue.touched")[-1]
+    tool, reference = run.matrix("snake.tool"), run.matrix("tip.reference")
+    error = np.linalg.norm(tool[:, :3] - reference[:, :3], axis=1)
+    volume = session.volume.tumour_volume
+    steps = session.steps
+    cap = int(np.count_nonzero(session.volume.labels == 3)) * session.volume.voxel
+    return {
+        "tumour_volume": volume,
+        "cap_volume": cap,
+        "reachable_fraction": reach.fraction,
+        "planned_fraction": session.fraction,
+        "resected_fraction": float(removed[0]) / volume,
+        "healthy_removed": float(removed[1]),
+        "max_outside_depth": outside_depth(carving_of(run).volume),
+        "min_critical_distance": float(nearest) if nearest >= 0.0 else None,
+        "body_collisions": int(hits),
+        "procedures": sum(step.kind not in ("home", "finish") for step in steps),
+        "finishes": sum(step.kind == "finish" for step in steps),
+        "planning_time": operation.planning_time,
+        "reach_time": reach.time,
+        "execution_time": carving_of(run).done.time + run.simulated,
+        "resumed_at": carving_of(run).done.time,
+        "path_length": float(run.signals["tissue.way"][-1]),
+        "max_tool_error": float(error.max()),
+        "rms_tool_error": float(np.sqrt(np.mean(error**2))),
+        "refusals": operation.refusals,
+        "unreached": [
+            {"volume": lump.volume, "where": lump.where, "reason": lump.reason}
+            for lump in reach.lumps[:12]
+        ],
+    }

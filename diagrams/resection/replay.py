@@ -1,0 +1,148 @@
+"""What is drawn into a resection's replay: the tumour that shrinks, and Figure 7."""
+
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Rgba
+
+from diagrams.resection.metrics import carving_of
+from diagrams.resection.scenario import plan_operation
+from plants.snake.last_module import meridian
+from plants.tissue.space import SOLID
+from plants.tissue.surface import surface
+from plants.tissue.volume import CAP, CRITICAL, TUMOUR
+from systems.resection.planning.procedure import widest_bend
+
+TISSUE = Rgba(0.93, 0.72, 0.42, 0.5)
+VESSEL = Rgba(0.75, 0.10, 0.12, 1.0)
+ELEMENTARY_VOLUME = Rgba(0.95, 0.85, 0.10, 0.45)
+STAGES = 28
+BLOCK = 0.012
+"""Edge in m of the blocks in which the surface is renewed."""
+
+
+def coarse(mask: np.ndarray, every: int) -> np.ndarray:
+    """A mask at every n-th voxel."""
+    return mask[::every, ::every, ::every]
+
+
+def shown_spacing(volume: Any) -> int:
+    """How many voxels an edge of the shown mesh spans."""
+    longest = max(volume.labels.shape) * volume.spacing
+    return max(1, round(max(0.8e-3, longest / 60) / volume.spacing))
+
+
+def decorate(meshcat: Any, animation: Any, run: Any) -> None:
+    """The tumour in blocks whose visibility is animated, the vessel, Figure 7."""
+    operation = plan_operation(run.scenario)
+    volume = operation.session.volume
+    carving = carving_of(run)
+    tau, first = carving.volume.tau, carving.done.index
+    moves = float(run.signals["tissue.index"][-1]) - first
+    end = float(run.signals["time"][-1]) / run.replay_speed
+    every = shown_spacing(volume)
+    spacing = every * volume.spacing
+    stages = np.linspace(0.0, 1.0, STAGES + 1)
+    tissue = np.isin(volume.labels, (TUMOUR, CAP))
+    shown: dict[tuple[int, ...], tuple[bytes, str]] = {}
+    for number, share in enumerate(stages):
+        gone = (tau <= first + share * moves) & (tau != SOLID)
+        vertices, faces = surface(coarse(tissue & ~gone, every), volume.origin, spacing)
+        blocks = _in_blocks(vertices, faces)
+        frame = animation.frame(share * end)
+        for key in set(shown) | set(blocks):
+            piece = blocks.get(key)
+            mark = piece[0].tobytes() if piece else b""
+            if key in shown and shown[key][0] == mark:
+                continue
+            if key in shown and shown[key][1]:
+                animation.SetProperty(frame, shown[key][1], "visible", False)
+            path = ""
+            if piece:
+                name = "_".join(map(str, key)).replace("-", "m")
+                path = f"tissue/{name}/{number}"
+                meshcat.SetTriangleMesh(path, piece[0].T, piece[1].T, TISSUE)
+                if number > 0:
+                    animation.SetProperty(0, path, "visible", False)
+                animation.SetProperty(frame, path, "visible", True)
+            shown[key] = (mark, path)
+    if (volume.labels == CRITICAL).any():
+        vertices, faces = surface(
+            coarse(volume.labels == CRITICAL, 1), volume.origin, volume.spacing
+        )
+        meshcat.SetTriangleMesh("vessel", vertices.T, faces.T, VESSEL)
+    _elementary_volumes(meshcat, animation, run, operation)
+    # The study's view shows 6 cm; a smaller tumour is looked at from nearer.
+    view = run.study.view
+    nearer = min(1.0, float(np.ptp(volume.points(tissue), axis=0).max()) / 0.055)
+    target = nearer * np.array(view.target)
+    away = np.array(view.camera) - np.array(view.target)
+    meshcat.SetCameraPose(target + nearer * away, target)
+
+
+def _in_blocks(
+    vertices: np.ndarray, faces: np.ndarray
+) -> dict[tuple[int, ...], tuple[np.ndarray, np.ndarray]]:
+    """The mesh cut into blocks: vertices and faces of each."""
+    if len(faces) == 0:
+        return {}
+    key = np.floor(vertices[faces].mean(axis=1) / BLOCK).astype(int)
+    unique, group = np.unique(key, axis=0, return_inverse=True)
+    blocks = {}
+    for number, name in enumerate(unique):
+        own = faces[group.reshape(-1) == number]
+        used, index = np.unique(own, return_inverse=True)
+        blocks[tuple(int(k) for k in name)] = (
+            vertices[used].round(6),
+            index.reshape(own.shape).astype(np.int32),
+        )
+    return blocks
+
+
+def dome(
+    p_WI: np.ndarray, n: np.ndarray, bend: float, params: Any, rays: int = 48
+) -> tuple[np.ndarray, np.ndarray]:
+    """The surface that the tool's centre sweeps about an intermediate pose (Figure 7).
+
+    Returns:
+        Vertices in W in m (n, 3), and triangles (m, 3).
+    """
+    rings = 12
+    r, z = meridian(np.linspace(0.0, bend, rings + 1), params)
+    e = np.cross(n, [1.0, 0.0, 0.0] if abs(n[0]) < 0.7 else [0.0, 1.0, 0.0])
+    e /= np.linalg.norm(e)
+    f = np.cross(n, e)
+    turn = 2 * np.pi * np.arange(rays) / rays
+    ring = np.cos(turn)[:, None] * e + np.sin(turn)[:, None] * f
+    points = p_WI + r[:, None, None] * ring + z[:, None, None] * n
+    index = np.arange((rings + 1) * rays).reshape(rings + 1, rays)
+    a, b = index[:-1], index[1:]
+    c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
+    faces = np.concatenate(
+        [np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=0
+    )
+    return points.reshape(-1, 3), faces.reshape(-1, 3)
+
+
+def _elementary_volumes(meshcat: Any, animation: Any, run: Any, operation: Any) -> None:
+    """Each elementary procedure's first volume, while it is carried out."""
+    session = operation.session
+    player = run.diagram.GetSubsystemByName("station")
+    times = player.GetSubsystemByName("procedure_player").times / run.replay_speed
+    params = session.params
+    for number, step in enumerate(session.steps):
+        if step.kind not in ("elementary", "volume") or step.procedure is None:
+            continue
+        if step.last <= carving_of(run).done.posture:
+            continue  # carried out before this run
+        n = step.procedure.axis()
+        ahead = params.straight_module + params.tool_offset
+        p_WI = np.array(step.procedure.position) - ahead * n
+        bend = widest_bend(step.procedure, params)
+        vertices, faces = dome(p_WI, n, bend, params)
+        path = f"elementary_volumes/{number}"
+        meshcat.SetTriangleMesh(path, vertices.T, faces.T, ELEMENTARY_VOLUME)
+        animation.SetProperty(0, path, "visible", False)
+        first, last = times[step.first], times[min(step.last, len(times) - 1)]
+        animation.SetProperty(animation.frame(first), path, "visible", True)
+        animation.SetProperty(animation.frame(last), path, "visible", False)

@@ -1,0 +1,1 @@
+"""The wire-driven snake in motion."""

@@ -1,0 +1,141 @@
+"""The diagram of a moving snake: from a tool pose to wires, and back to a pose."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.common.wiring import add_blocks, finish
+from diagrams.snake.scenario import ELASTIC_STEP, SnakeScenario
+from plants.snake.elastic_wires import ElasticWires
+from plants.snake.inverse_kinematics import tool_postures
+from plants.snake.looks import draw_channel
+from plants.snake.snake import add_snake, set_default_posture
+from systems.resection.wires.resection_ik import ResectionIk, universal
+from systems.resection.wires.snake_location import SnakeLocation
+from systems.resection.wires.tip_reference import TipReference, reference
+from systems.resection.wires.wire_drums import WireDrums
+from systems.resection.wires.wire_forward_actuation import WireForwardActuation
+from systems.resection.wires.wire_inverse_actuation import (
+    WireInverseActuation,
+    wound_lengths,
+)
+from systems.resection.wires.wire_tension import WireTension
+from systems.resection.wires.wire_watch import WireWatch
+
+WIRES = (
+    # What is asked for becomes a posture, and the posture lengths of wires.
+    ("tip_reference.target", "resection_ik.target"),
+    ("resection_ik.posture", "wire_inverse_actuation.posture"),
+    ("wire_inverse_actuation.drums", "wire_drums.command"),
+    # The lengths impose a posture.
+    ("wire_drums.rates", "wire_forward_actuation.rates"),
+    # Where the snake is, and whether a wire is slack.
+    ("plant.snake_state", "snake_location.state"),
+    ("wire_watch.stop", "wire_drums.stop"),
+)
+"""Signals of both wire models."""
+
+DRUM_WIRES = (
+    ("wire_drums.lengths", "wire_forward_actuation.lengths"),
+    ("wire_forward_actuation.desired_state", "plant.snake_desired_state"),
+    ("plant.snake_state", "wire_tension.state"),
+    ("plant.snake_net_actuation", "wire_tension.net_actuation"),
+    ("wire_tension.tension", "wire_watch.tension"),
+)
+
+ELASTIC_WIRES = (
+    ("elastic_wires.measured", "wire_forward_actuation.lengths"),
+    ("elastic_wires.travel", "plant.snake_desired_state"),
+    ("plant.snake_state", "elastic_wires.state"),
+    ("wire_drums.lengths", "elastic_wires.lengths"),
+    ("wire_drums.rates", "elastic_wires.rates"),
+    ("elastic_wires.generalized_force", "plant.applied_generalized_force"),
+    ("elastic_wires.tension", "wire_watch.tension"),
+)
+
+EXPORTS = {
+    "tip.reference": "tip_reference.reference",
+    "snake.tool": "snake_location.tool",
+    "snake.posture": "snake_location.posture",
+    "snake.coupler_error": "snake_location.coupler_error",
+    "ik.status": "resection_ik.status",
+    "drums.lengths": "wire_drums.lengths",
+    "drums.limited": "wire_drums.limited",
+    "wires.residual": "wire_forward_actuation.residual",
+    "watch.alarm": "wire_watch.alarm",
+    "scene_graph.query": "scene_graph.query",
+}
+
+CHANNEL_CLEARANCE = 1.0e-3
+"""Between the snake's body and the access channel, in m; drawn only."""
+
+
+def start_posture(scenario: SnakeScenario) -> list[float]:
+    """The posture (7) that the tip's reference begins with."""
+    v = reference(scenario.tip, 0.0)
+    return tool_postures(v[:3], v[3:6], v[6:], scenario.snake).q.tolist()
+
+
+def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
+    """The blocks of the diagram, by the names that the wires use."""
+    s = scenario
+    elastic = s.wires == "elastic"
+    posture = start_posture(s)
+    winding = s.inverse_actuation
+    if elastic:
+        winding = replace(winding, stiffness=s.drive.wire_stiffness)
+    lengths = wound_lengths(posture, winding, s.snake, s.drive)
+    blocks = {
+        "tip_reference": TipReference(replace(s.tip, lead=s.period)),
+        "resection_ik": ResectionIk(
+            replace(s.resection_ik, period=s.period), s.snake, posture
+        ),
+        "wire_inverse_actuation": WireInverseActuation(winding, s.snake, s.drive),
+        "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
+        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "snake_location": SnakeLocation(s.snake),
+        "wire_watch": WireWatch(replace(s.watch, period=s.period)),
+    }
+    if not elastic:
+        blocks["wire_tension"] = WireTension(s.tension, s.snake)
+    else:
+        blocks["elastic_wires"] = ElasticWires(s.elastic, s.snake, s.drive)
+    return blocks
+
+
+def make_snake_diagram(
+    scenario: SnakeScenario, swaps: Mapping[str, Any] | None = None
+) -> Any:
+    """Makes the diagram of a moving snake.
+
+    Args:
+        scenario: The parameters.
+        swaps: Systems that replace blocks of the same name and ports.
+
+    Returns:
+        The diagram, its signals exported as `model.signal`.
+
+    Raises:
+        ValueError: If a parameter makes no sense, or a swap has no place.
+    """
+    elastic = scenario.wires == "elastic"
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(
+        builder, time_step=ELASTIC_STEP if elastic else 0.0
+    )
+    snake = add_snake(
+        plant, plant.world_frame(), scenario.snake, scenario.drive, elastic
+    )
+    channel = scenario.snake.body_radius + CHANNEL_CLEARANCE
+    draw_channel(plant, plant.world_body(), channel)
+    plant.Finalize()
+    set_default_posture(plant, snake, universal(start_posture(scenario)))
+    blocks = add_blocks(builder, make_blocks(scenario), swaps)
+    systems = blocks | {"plant": plant, "scene_graph": scene_graph}
+    wires = WIRES + (ELASTIC_WIRES if elastic else DRUM_WIRES)
+    tension = "elastic_wires.tension" if elastic else "wire_tension.tension"
+    exports = EXPORTS | {"wires.tension": tension}
+    return finish(builder, "snake", systems, wires, exports)

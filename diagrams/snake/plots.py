@@ -1,0 +1,142 @@
+"""Plots of a moving snake: where it went, how far off, and what the wires did."""
+
+from typing import Any
+
+from matplotlib.figure import Figure
+import numpy as np
+
+from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
+from diagrams.snake.metrics import break_time, errors, judged
+from plants.snake.actuation import wire_lengths
+from plants.snake.kinematics import centreline
+from plants.snake.parameters import MODULES, WIRES
+
+MM = 1e3
+MODULE_COLORS = ("#d93329", "#1a8c47", "#2159cc")
+STYLES = ("-", "--", ":")
+
+
+def _events(run: Any, *panels: Any) -> None:
+    """Marks a snapping wire and the alarm."""
+    snapped = break_time(run.scenario)
+    alarm = float(run.matrix("watch.alarm")[-1, 0])
+    for axes in panels:
+        if snapped is not None:
+            axes.axvline(snapped, color="k", lw=1.0, label="wire snaps")
+        if alarm >= 0.0:
+            axes.axvline(alarm, color=COLORS["accent"], lw=1.5, ls="--", label="alarm")
+
+
+def path(run: Any) -> Figure:
+    """The snake in some postures, and its tip's path with the reference."""
+    figure = new_figure(7.0, 6.0)
+    axes = add_axes(figure, 1, 1, 1, projection="3d")
+    time, tip = run.signals["time"], run.scenario.tip
+    q = run.matrix("snake.posture")
+    tool = run.matrix("snake.tool")[:, :3] * MM
+    reference = run.matrix("tip.reference")[:, :3] * MM
+    if tip.poses:
+        shown = (
+            np.arange(tip.dwell, time[-1] + 1e-6, tip.dwell)[: len(tip.poses)] - 0.02
+        )
+    else:
+        shown = tip.circle.ramp + tip.circle.period * np.arange(6) / 6
+    points = centreline(q, run.scenario.snake) * MM
+    for i in np.searchsorted(time, shown[shown <= time[-1]]):
+        body = points[min(i, len(points) - 1)]
+        axes.plot(*body.T, color=COLORS["robot"], lw=4, alpha=0.25)
+        axes.plot(*body[:6].T, "o", color=COLORS["accent"], ms=3.5, alpha=0.6)
+    style = {"color": COLORS["target"], "label": "reference"}
+    if tip.poses:
+        axes.plot(*reference.T, "x", ms=7, **style)
+    else:
+        axes.plot(*reference.T, lw=3, alpha=0.5, **style)
+    axes.plot(*tool.T, color=COLORS["robot"], lw=1.0, label="tip")
+    equal_axes(axes, points.reshape(-1, 3))
+    axes.legend(loc="upper left")
+    axes.set_title(run.scenario.description)
+    return figure
+
+
+def pose_errors(run: Any) -> Figure:
+    """Tip and axis against the reference; grey where they count."""
+    figure = new_figure(7.0, 4.6)
+    time, flags = run.signals["time"], judged(run)
+    position, angle = errors(run)
+    upper = add_axes(figure, 2, 1, 1)
+    upper.semilogy(time, position * MM, color=COLORS["robot"], lw=1.0)
+    upper.set(ylabel="tip error [mm]", xlim=(0, time[-1]))
+    upper.set_ylim(bottom=max(1e-4, upper.get_ylim()[0]))  # it starts without any
+    lower = add_axes(figure, 2, 1, 2, sharex=upper)
+    lower.semilogy(time, np.degrees(angle), color=COLORS["target"], lw=1.0)
+    lower.set(ylabel="axis error [deg]", xlabel="time [s]")
+    lower.set_ylim(bottom=max(1e-3, lower.get_ylim()[0]))
+    if not flags.all():
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+        for first, last in edges.reshape(-1, 2):
+            for axes in (upper, lower):
+                end = time[min(last, len(time) - 1)]
+                axes.axvspan(time[first], end, color=COLORS["muted"], alpha=0.35, lw=0)
+    _events(run, upper, lower)
+    return figure
+
+
+def wires(run: Any) -> Figure:
+    """What the drums wound, from the straight robot's lengths, and the tensions."""
+    figure = new_figure(7.4, 5.6)
+    time = run.signals["time"]
+    straight = wire_lengths(np.zeros(7), run.scenario.snake)
+    change = (run.matrix("drums.lengths")[:, :9] - straight) * MM
+    tension = run.matrix("wires.tension")
+    upper = add_axes(figure, 2, 1, 1)
+    lower = add_axes(figure, 2, 1, 2, sharex=upper)
+    for w in range(WIRES * MODULES):
+        style = {"color": MODULE_COLORS[w // WIRES], "ls": STYLES[w % WIRES], "lw": 1.0}
+        upper.plot(
+            time, change[:, w], label=f"{w // WIRES + 1}.{w % WIRES + 1}", **style
+        )
+        lower.plot(time, tension[:, w], **style)
+    upper.set(ylabel="wound out [mm]", xlim=(0, time[-1]))
+    lower.set(ylabel="tension [N]", xlabel="time [s]", ylim=(0, None))
+    upper.legend(title="wire", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    _events(run, upper, lower)
+    if break_time(run.scenario) is not None:
+        lower.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def break_closeup(run: Any) -> Figure:
+    """Tensions, residual and drums around the instant at which a wire snaps."""
+    figure = new_figure(7.4, 6.0)
+    time, snapped = run.signals["time"], break_time(run.scenario) or 0.0
+    near = (time > snapped - 0.2) & (time < snapped + 0.4)
+    top = add_axes(figure, 3, 1, 1)
+    tension = run.matrix("wires.tension")[near]
+    for w in range(WIRES * MODULES):
+        style = {"color": MODULE_COLORS[w // WIRES], "ls": STYLES[w % WIRES]}
+        top.plot(time[near], tension[:, w], lw=1.2, **style)
+    top.axhline(run.scenario.watch.least, color=COLORS["muted"], lw=0.8)
+    top.set(ylabel="tension [N]", ylim=(0, None))
+    middle = add_axes(figure, 3, 1, 2, sharex=top)
+    residual = np.abs(run.matrix("wires.residual")[near])
+    for m in range(MODULES):
+        color, label = MODULE_COLORS[m], f"module {m + 1}"
+        middle.semilogy(time[near], residual[:, m] + 1e-9, color=color, label=label)
+    middle.set(ylabel="wires disagree")
+    middle.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    bottom = add_axes(figure, 3, 1, 3, sharex=top)
+    rates = np.gradient(run.matrix("drums.lengths"), time, axis=0)[near]
+    bottom.plot(time[near], np.abs(rates).max(axis=1) * MM, color=COLORS["robot"])
+    bottom.set(ylabel="fastest drum [mm/s]", xlabel="time [s]", ylim=(0, None))
+    _events(run, top, middle, bottom)
+    bottom.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def plots(run: Any) -> dict[str, Figure]:
+    """All plots of a run, by file name."""
+    figures = {"path": path(run), "errors": pose_errors(run), "wires": wires(run)}
+    snapped = break_time(run.scenario)
+    if snapped is not None and snapped < run.signals["time"][-1]:
+        figures["break"] = break_closeup(run)
+    return figures

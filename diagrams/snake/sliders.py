@@ -1,0 +1,81 @@
+"""The snake in Meshcat without a simulation, to be bent by sliders."""
+
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Cylinder, Rgba, Sphere
+from pydrake.math import RigidTransform, RotationMatrix
+
+from diagrams.snake.wire_replay import draw_wires
+from plants.snake.actuation import wire_lengths
+from plants.snake.kinematics import Array, centreline
+from plants.snake.looks import BRASS, PLATE, SWEPT
+from plants.snake.parameters import SnakeParams
+
+
+def show_snake(meshcat: Any, q: Array, params: SnakeParams | None = None) -> Array:
+    """Draws balls, plates, tool and wires of a posture.
+
+    Args:
+        meshcat: Where to draw.
+        q: Posture, (7,).
+        params: The snake.
+
+    Returns:
+        Lengths of wires 0 to 8 in m, (9,).
+    """
+    params = (params or SnakeParams()).check()
+    points = centreline(q, params)
+    plate = Cylinder(params.body_radius, params.plate_thickness)
+    for i in range(7):
+        # A plate stands h past each ball, and one h before the first.
+        axis = points[i] - points[i - 1] if i else np.array([0.0, 0.0, 1.0])
+        R_WP = RotationMatrix.MakeFromOneVector(axis, 2)
+        middle = points[i] - params.half_pitch * R_WP.col(2)
+        meshcat.SetObject(f"snake/plate{i}", plate, Rgba(*PLATE))
+        meshcat.SetTransform(f"snake/plate{i}", RigidTransform(R_WP, middle))
+        if i < 6:
+            ball = Sphere(params.ball_radius)
+            meshcat.SetObject(f"snake/ball{i}", ball, Rgba(*BRASS))
+            meshcat.SetTransform(f"snake/ball{i}", RigidTransform(points[i]))
+    if params.tool_radius > 0.0:
+        meshcat.SetObject("snake/tool", Sphere(params.tool_radius), Rgba(*SWEPT))
+        meshcat.SetTransform("snake/tool", RigidTransform(points[7]))
+    draw_wires(meshcat, "snake/wires", q, params)
+    return wire_lengths(q, params)
+
+
+def bend_with_sliders(
+    meshcat: Any, seconds: float = 0.0, params: SnakeParams | None = None
+) -> Array:
+    """Lets Meshcat's sliders bend all three modules for some time.
+
+    Args:
+        meshcat: Where to draw; its controls get two sliders a module.
+        seconds: How long; 0 draws the sliders' postures once.
+        params: The snake.
+
+    Returns:
+        The last posture, (7,).
+    """
+    params = (params or SnakeParams()).check()
+    limits = {"alpha": (-np.pi, np.pi), "beta": (0.0, params.max_bend)}
+    sliders = [f"{angle}{k}" for k in (1, 2, 3) for angle in limits]
+    for path in ("/Grid", "/Axes"):
+        meshcat.SetProperty(path, "visible", False)
+    meshcat.SetCameraPose([0.060, -0.068, 0.048], [0.0, 0.0, 0.020])
+    start = {"alpha": 0.0, "beta": 0.3}
+    for name in sliders:
+        low, high = limits[name[:-1]]
+        meshcat.AddSlider(name, low, high, 0.01, start[name[:-1]])
+    end = monotonic() + seconds
+    while True:
+        q = np.array([0.0, *(meshcat.GetSliderValue(name) for name in sliders)])
+        show_snake(meshcat, q, params)
+        if monotonic() >= end:
+            break
+        sleep(0.05)
+    for name in sliders:
+        meshcat.DeleteSlider(name)
+    return q

@@ -1,0 +1,89 @@
+"""The moving snake as a study: what is logged, measured, plotted and shown."""
+
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Rgba, Sphere
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import SimulatorConfig
+
+from diagrams.common.replay import draw_trail
+from diagrams.common.study import Study, View, cenic
+from diagrams.snake.diagram import make_snake_diagram
+from diagrams.snake.metrics import break_time, measure
+from diagrams.snake.plots import plots
+from diagrams.snake.scenario import SnakeScenario, check
+from diagrams.snake.wire_replay import animate_wires
+
+XYZ = ("x", "y", "z")
+TOOL = (*XYZ, "n_x", "n_y", "n_z")
+NINE = tuple(f"w{i}" for i in range(9))
+SIGNALS = {
+    "tip.reference": TOOL,
+    "snake.tool": TOOL,
+    "snake.posture": ("s", "alpha1", "beta1", "alpha2", "beta2", "alpha3", "beta3"),
+    "snake.coupler_error": ("angle",),
+    "ik.status": ("code",),
+    "drums.lengths": (*NINE, "s"),
+    "drums.limited": ("code",),
+    "wires.residual": ("module1", "module2", "module3"),
+    "wires.tension": NINE,
+    "watch.alarm": ("time", "module"),
+}
+FRAME_RATE = 10.0
+"""Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
+LOG_PERIOD = 0.02
+
+
+def integrator(scenario: SnakeScenario) -> SimulatorConfig:
+    """CENIC with one step a command; the elastic wires have a discrete plant."""
+    if scenario.wires == "elastic":
+        return SimulatorConfig()
+    return cenic(scenario.period)
+
+
+def decorate(meshcat: Any, animation: Any, run: Any) -> None:
+    """Wires, the tip's trail, and the poses or the circle it is to take."""
+    time = run.signals["time"]
+    every = round(1.0 / (FRAME_RATE * LOG_PERIOD))
+    snapped = break_time(run.scenario)
+    broken = {item.wire: item.time for item in run.scenario.elastic.breaks}
+    if snapped is None or snapped > time[-1]:
+        broken = {}
+    animate_wires(
+        meshcat,
+        animation,
+        "wires",
+        time[::every],
+        run.matrix("snake.posture")[::every],
+        run.scenario.snake,
+        broken,
+    )
+    tool = run.matrix("snake.tool")[:, :3]
+    draw_trail(meshcat, animation, "trail", time, tool, (0.12, 0.37, 0.85, 1.0))
+    green = Rgba(0.16, 0.56, 0.31, 1.0)
+    reference = run.matrix("tip.reference")[:, :3]
+    if run.scenario.tip.poses:
+        for i, point in enumerate(np.unique(reference, axis=0)):
+            meshcat.SetObject(f"poses/{i}", Sphere(0.9e-3), green)
+            meshcat.SetTransform(f"poses/{i}", RigidTransform(point))
+    else:
+        turn = time <= run.scenario.tip.circle.ramp + run.scenario.tip.circle.period
+        meshcat.SetLine("circle", reference[turn].T, 2.0, green)
+
+
+STUDY = Study(
+    name="snake",
+    scenario=SnakeScenario,
+    make_diagram=make_snake_diagram,
+    check=check,
+    measure=measure,
+    signals=SIGNALS,
+    log_period=LOG_PERIOD,
+    plots=plots,
+    decorate=decorate,
+    controller="resection_ik",
+    integrator=integrator,
+    view=View(camera=(0.060, -0.068, 0.048), target=(0.0, 0.0, 0.025)),
+    frame_rate=FRAME_RATE,
+)

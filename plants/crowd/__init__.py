@@ -1,0 +1,1 @@
+"""What walks about: obstacles that move, and crowds."""

@@ -1,0 +1,328 @@
+"""The snake's body as balls, and driving it from one posture to another.
+
+Postures are in the non-singular coordinates x = (s, a1, b1, a2, b2, a3, b3) of
+`plants.snake.kinematics`, in which a straight line between two postures keeps the
+bend's limit, a cone that is convex there.
+
+The body is balls of its radius along the axis, the last plate as a cylinder, and the
+thin shank of the tool. Between two balls, 1.6 mm apart, it stands out by 0.08 mm.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plants.snake.parameters import SnakeParams
+from plants.tissue.space import (
+    FREE,
+    body_solid,
+    first_forbidden,
+    first_solid,
+    plate_solid,
+    roll_back,
+    stamp,
+)
+from systems.common.compiled import compiled
+
+OK = 0
+BODY = 1  # some part of the body meets tissue
+TOOL = 2  # the tool would leave what it may remove
+BEND = 3  # a bend beyond its limit
+TRAVEL = 4  # the translation beyond its travel
+
+CULPRIT = 9
+"""Numbers that name what a pose met: part, point, radius, voxel, axis of a plate."""
+
+SHANK = 1.2e-3
+"""Radius of the tool's shank in m."""
+
+EDGE_SHARE = 8
+"""How much oftener than round body and tool the last plate is checked.
+
+Halfway between two checks a round body stands out of where it was found to fit by
+0.01 mm, an edge by up to 0.7 of half the way: 0.02 mm at an eighth of 0.5 mm. The
+plan's clearance covers that and the tracking's error.
+"""
+
+
+class Body(NamedTuple):
+    """The robot's numbers for compiled functions. SI units.
+
+    Attributes:
+        h: Half the distance between ball centres.
+        tool: Distance from O3 to the tool.
+        radius: Of the tool's ball.
+        frees: Radius of what the tool surely frees, path errors considered.
+        body: Radius of the body, clearance included.
+        face: Distance from the last ball's centre to the last plate's outer face.
+        bend: Largest beta.
+        low: Least translation.
+        high: Largest translation.
+        shank: Radius of the tool's shank.
+        step: Longest stretch of the body's motion between two checks.
+    """
+
+    h: float
+    tool: float
+    radius: float
+    frees: float
+    body: float
+    face: float
+    bend: float
+    low: float
+    high: float
+    shank: float
+    step: float
+
+
+def body_of(
+    params: SnakeParams,
+    clearance: float = 0.0,
+    accuracy: float = 0.0,
+    step: float = 0.5e-3,
+) -> Body:
+    """The robot's numbers.
+
+    Args:
+        params: The robot.
+        clearance: By which its body is taken for wider, in m.
+        accuracy: By which its tool is taken for smaller where it frees space, in m.
+        step: Longest stretch of motion between two checks, in m.
+    """
+    return Body(
+        params.half_pitch,
+        params.tool_offset,
+        params.tool_radius,
+        params.tool_radius - accuracy,
+        params.body_radius + clearance,
+        params.half_pitch + params.plate_thickness / 2 + clearance,
+        params.max_bend,
+        params.travel[0],
+        params.travel[1],
+        SHANK + clearance,
+        step,
+    )
+
+
+@compiled
+def corners(x: Any, h: float, tool: float, out: Any) -> None:
+    """Six ball centres, O3 and the tool of a posture (7,), into out (8, 3)."""
+    p0, p1, p2 = 0.0, 0.0, x[0]
+    # Columns of the rotation: e across x, f across y, n along the robot.
+    e0, e1, e2 = 1.0, 0.0, 0.0
+    f0, f1, f2 = 0.0, 1.0, 0.0
+    n0, n1, n2 = 0.0, 0.0, 1.0
+    for k in range(3):
+        ca, sa = math.cos(x[1 + 2 * k]), math.sin(x[1 + 2 * k])
+        cb, sb = math.cos(x[2 + 2 * k]), math.sin(x[2 + 2 * k])
+        for half in range(2):
+            out[2 * k + half, 0] = p0
+            out[2 * k + half, 1] = p1
+            out[2 * k + half, 2] = p2
+            if half == 0:  # Rx(a) Ry(b)
+                f0, n0 = ca * f0 + sa * n0, ca * n0 - sa * f0
+                f1, n1 = ca * f1 + sa * n1, ca * n1 - sa * f1
+                f2, n2 = ca * f2 + sa * n2, ca * n2 - sa * f2
+                e0, n0 = cb * e0 - sb * n0, cb * n0 + sb * e0
+                e1, n1 = cb * e1 - sb * n1, cb * n1 + sb * e1
+                e2, n2 = cb * e2 - sb * n2, cb * n2 + sb * e2
+            else:  # Ry(b) Rx(a)
+                e0, n0 = cb * e0 - sb * n0, cb * n0 + sb * e0
+                e1, n1 = cb * e1 - sb * n1, cb * n1 + sb * e1
+                e2, n2 = cb * e2 - sb * n2, cb * n2 + sb * e2
+                f0, n0 = ca * f0 + sa * n0, ca * n0 - sa * f0
+                f1, n1 = ca * f1 + sa * n1, ca * n1 - sa * f1
+                f2, n2 = ca * f2 + sa * n2, ca * n2 - sa * f2
+            p0, p1, p2 = p0 + 2 * h * n0, p1 + 2 * h * n1, p2 + 2 * h * n2
+    out[6, 0], out[6, 1], out[6, 2] = p0, p1, p2
+    out[7, 0], out[7, 1], out[7, 2] = p0 + tool * n0, p1 + tool * n1, p2 + tool * n2
+
+
+@compiled
+def _blame(
+    why: Any, part: int, x: float, y: float, z: float, rho: float, at: int
+) -> int:
+    why[0], why[1], why[2], why[3] = part, x, y, z
+    why[4], why[5] = rho, at
+    return BODY
+
+
+@compiled
+def check_links(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
+    """OK or BODY for the round body up to the last ball; as `check_body`."""
+    if first == 0:
+        z = c[0, 2] - b.h / 2
+        while z > -b.body:
+            at = body_solid(s, 0.0, 0.0, z, b.body)
+            if at != FREE:
+                return _blame(why, 0, 0.0, 0.0, z, b.body, at)
+            z -= b.h / 2
+    for link in range(first, 5):
+        for n in range(4):
+            t = n / 4
+            x = c[link, 0] + t * (c[link + 1, 0] - c[link, 0])
+            y = c[link, 1] + t * (c[link + 1, 1] - c[link, 1])
+            z = c[link, 2] + t * (c[link + 1, 2] - c[link, 2])
+            at = body_solid(s, x, y, z, b.body)
+            if at != FREE:
+                return _blame(why, link, x, y, z, b.body, at)
+    x, y, z = c[5, 0], c[5, 1], c[5, 2]
+    at = body_solid(s, x, y, z, b.body)
+    if at != FREE:
+        return _blame(why, 5, x, y, z, b.body, at)
+    return OK
+
+
+@compiled
+def check_plate(s: Any, b: Any, c: Any, more: float, why: Any) -> int:
+    """OK or BODY for the last plate, taken for wider all round by `more` in m."""
+    length = 2 * b.h + b.tool
+    n0 = (c[7, 0] - c[5, 0]) / length
+    n1 = (c[7, 1] - c[5, 1]) / length
+    n2 = (c[7, 2] - c[5, 2]) / length
+    x, y, z = c[5, 0] - more * n0, c[5, 1] - more * n1, c[5, 2] - more * n2
+    at = plate_solid(s, x, y, z, n0, n1, n2, b.face + 2 * more, b.body + more)
+    if at == FREE:
+        return OK
+    half = b.face / 2
+    x, y, z = c[5, 0] + half * n0, c[5, 1] + half * n1, c[5, 2] + half * n2
+    why[6], why[7], why[8] = n0, n1, n2
+    return _blame(why, 6, x, y, z, b.body, at)
+
+
+@compiled
+def check_shank(s: Any, b: Any, c: Any, why: Any) -> int:
+    """OK or BODY for the tool's shank."""
+    length = 2 * b.h + b.tool
+    along = b.face
+    while along < length - b.radius + b.shank:
+        share = along / length
+        x = c[5, 0] + share * (c[7, 0] - c[5, 0])
+        y = c[5, 1] + share * (c[7, 1] - c[5, 1])
+        z = c[5, 2] + share * (c[7, 2] - c[5, 2])
+        at = first_solid(s, x, y, z, b.shank)
+        if at != FREE:
+            return _blame(why, 7, x, y, z, b.shank, at)
+        along += b.shank
+    return OK
+
+
+@compiled
+def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
+    """OK or BODY for a body with corners c (8, 3); the culprit goes to why (9,).
+
+    Parts 0 to 5 are the links behind each ball (0 what lies in the channel), 6 the
+    last plate, 7 the shank. Those before `first` are taken for free.
+    """
+    status = check_links(s, b, c, first, why)
+    if status == OK:
+        status = check_plate(s, b, c, 0.0, why)
+    if status == OK:
+        status = check_shank(s, b, c, why)
+    return status
+
+
+@compiled
+def check_limits(b: Any, x: Any) -> int:
+    """OK, BEND or TRAVEL."""
+    if x[0] < b.low - 1e-9 or x[0] > b.high + 1e-9:
+        return TRAVEL
+    least = math.cos(b.bend) - 1e-9
+    for k in range(3):
+        if math.cos(x[1 + 2 * k]) * math.cos(x[2 + 2 * k]) < least:
+            return BEND
+    return OK
+
+
+@compiled
+def between(x0: Any, x1: Any, share: float, out: Any) -> None:
+    """The posture at a share of the straight way; at 1 exactly x1."""
+    for r in range(7):
+        out[r] = x1[r] if share == 1.0 else x0[r] + share * (x1[r] - x0[r])
+
+
+@compiled
+def drive(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> int:
+    """Moves from a posture that fits to another, freeing what the tool sweeps.
+
+    Every step of the straight line is checked, body first, then tool: the body may
+    use what the tool has freed ahead of it. The last plate, which has an edge, is
+    looked at `EDGE_SHARE` times as often. If a step fails, nothing has happened.
+
+    Args:
+        s: The space.
+        b: The body.
+        x0: Posture (7,) at which the robot stands.
+        x1: Posture (7,) to reach.
+        time: Arrival time of what this motion frees.
+        why: Takes the culprit (9): part, point [m], radius [m], voxel, plate's axis.
+
+    Returns:
+        OK, BODY, TOOL, BEND or TRAVEL.
+    """
+    freed, roomed = s.used[0], s.used[1]
+    status, _ = drive_far(s, b, x0, x1, time, why)
+    if status != OK:
+        roll_back(s, freed, roomed)
+    return status
+
+
+@compiled
+def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
+    """As `drive`, but goes as far as it can and stops there.
+
+    Returns:
+        The status, and the share of the way that was gone.
+    """
+    status = check_limits(b, x1)
+    if status != OK:
+        return status, 0.0
+    c0, c1, x = np.empty((8, 3)), np.empty((8, 3)), np.empty(7)
+    corners(x0, b.h, b.tool, c0)
+    corners(x1, b.h, b.tool, c1)
+    longest = 0.0
+    for n in range(8):
+        d = 0.0
+        for r in range(3):
+            d += (c1[n, r] - c0[n, r]) ** 2
+        longest = max(longest, d)
+    longest = math.sqrt(longest)
+    steps = max(1, math.ceil(EDGE_SHARE * longest / b.step))
+    sure, freed, roomed = 0, s.used[0], s.used[1]
+    moving = 4  # the first part of the body that moves: the last module
+    for r in range(5):
+        if x0[r] != x1[r]:
+            moving = 0
+    roomy = False  # the plate has room all along this stretch
+    for n in range(1, steps + 1):
+        if n % EDGE_SHARE == 1:
+            # Once for all of it: no corner of the body goes farther from its middle.
+            last = min(n + EDGE_SHARE - 1, steps)
+            between(x0, x1, (n + last) / (2 * steps), x)
+            corners(x, b.h, b.tool, c0)
+            more = (last - n) / (2 * steps) * longest
+            roomy = check_plate(s, b, c0, more, why) == OK
+        whole = n % EDGE_SHARE == 0 or n == steps
+        if roomy and not whole:
+            continue
+        between(x0, x1, n / steps, x)
+        corners(x, b.h, b.tool, c0)
+        status = OK if roomy else check_plate(s, b, c0, 0.0, why)
+        if whole and status == OK:
+            status = check_links(s, b, c0, moving, why)
+        if whole and status == OK:
+            status = check_shank(s, b, c0, why)
+        if whole and status == OK:
+            at = first_forbidden(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius)
+            if at != FREE:
+                why[0], why[1], why[2], why[3] = 8, c0[7, 0], c0[7, 1], c0[7, 2]
+                why[4], why[5] = b.radius, at
+                status = TOOL
+        if status != OK:
+            roll_back(s, freed, roomed)
+            return status, sure / steps
+        if whole:
+            stamp(s, c0[7, 0], c0[7, 1], c0[7, 2], b.frees, time)
+            sure, freed, roomed = n, s.used[0], s.used[1]
+    return OK, 1.0

@@ -1,0 +1,1 @@
+"""What the surgeon does: tools in hands, recordings, tremor."""

@@ -1,0 +1,1 @@
+"""Tissue: masks, voxels, free space, and what the tool carves."""

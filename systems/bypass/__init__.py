@@ -1,0 +1,1 @@
+"""Attract or bypass, and a hard clearance (after both papers)."""

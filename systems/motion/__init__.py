@@ -1,0 +1,1 @@
+"""From a wanted velocity to joints, and the camera."""

@@ -1,0 +1,1 @@
+"""Planning a resection: procedures, feasibility, sessions, the planner."""

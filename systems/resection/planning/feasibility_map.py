@@ -1,0 +1,113 @@
+"""Where an elementary volume is feasible now: a map over the surface of free space."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from plants.snake.snake_body import TOOL
+from plants.tissue.space import SOLID
+from plants.tissue.volume import CRITICAL, TUMOUR
+from systems.resection.planning.session import Session
+from systems.resection.planning.sweep import straightened, try_procedure
+from systems.resection.planning.tree import nearest_nodes
+
+NODES = 2
+"""Postures of the tree from which a volume is tried."""
+
+TURNS = (0.6, 0.2)
+"""How far, as a share, their axes are turned towards the point."""
+
+
+@dataclass
+class FeasibilityMap:
+    """A map.
+
+    Attributes:
+        points: On the tissue that borders free space, in W in m, (n, 3).
+        gained: Tumour in m3 that an elementary volume there would remove, (n,); 0
+            if none is feasible.
+        reasons: "" where one is feasible, else what is in the way, n of them.
+    """
+
+    points: NDArray[np.float64]
+    gained: NDArray[np.float64]
+    reasons: list[str]
+
+    @property
+    def feasible(self) -> NDArray[np.bool_]:
+        """Where an elementary volume is feasible, (n,)."""
+        return self.gained > 0.0
+
+
+def border(session: Session) -> NDArray[np.int64]:
+    """Flat indices of tumour voxels that border free space."""
+    volume = session.volume
+    solid = (volume.labels == TUMOUR) & (volume.tau == SOLID)
+    free = volume.tau != SOLID
+    return np.flatnonzero(solid & ndimage.binary_dilation(free))
+
+
+def feasibility_map(
+    session: Session,
+    count: int = 1000,
+    bend: float = 0.35,
+    pitch: float = 3.0e-3,
+    seed: int = 1,
+) -> FeasibilityMap:
+    """Tries an elementary volume at points all over the border of free space.
+
+    The volumes are clipped, as the planner's; each starts from the nearest postures
+    that were reached, turned towards the point.
+
+    Args:
+        session: How things stand; nothing changes.
+        count: Points.
+        bend: Of the volume's widest ring, in rad.
+        pitch: Between rings and along them, in m.
+        seed: Of the choice of points.
+    """
+    volume, body, tree = session.volume, session.body, session.tree
+    volume.forget_journals()
+    session.make_room()
+    tree = session.tree
+    rng = np.random.default_rng(seed)
+    voxels = border(session)
+    if len(voxels) > count:
+        voxels = rng.choice(voxels, count, replace=False)
+    points = volume.origin + volume.spacing * np.column_stack(
+        np.unravel_index(voxels, volume.labels.shape)
+    )
+    s, why = volume.space(), session.why
+    found, far = np.empty(NODES, np.int64), np.empty(NODES)
+    gained, reasons = np.zeros(len(points)), []
+    x = np.empty(7)
+    for n, p in enumerate(points):
+        nearest_nodes(tree, p[0], p[1], p[2], found, far)
+        reason = "limit"
+        for node, turn in product(found[found >= 0], TURNS):
+            if not straightened(body, tree.x[node], p, turn, x):
+                continue
+            gain = try_procedure(
+                s, body, tree, int(node), x, 0.0, pitch, bend, pitch, why
+            )
+            if gain > 0:
+                gained[n] = gain * volume.voxel
+                reason = ""
+                break
+            reason = _reason(session, int(why[0]))
+        reasons.append(reason)
+    return FeasibilityMap(points, gained, reasons)
+
+
+def _reason(session: Session, part: int) -> str:
+    """What the culprit of the last failure is, in a word."""
+    at = int(session.why[5])
+    label = session.volume.labels.reshape(-1)[at] if at >= 0 else 0
+    if label == CRITICAL:
+        return "critical"
+    if part == 8 or part == TOOL:
+        return "tool outside"
+    return "never freed" if label == TUMOUR else "brain"

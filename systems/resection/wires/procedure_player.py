@@ -1,0 +1,145 @@
+"""Procedure player: plays a plan as a smooth stream of tool poses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from plants.snake.kinematics import frames
+from plants.snake.parameters import SnakeParams
+from systems.common.block import Block
+from systems.resection.wires.resection_ik import from_universal
+
+
+@dataclass
+class ProcedurePlayerParams:
+    """Parameters of `ProcedurePlayer`.
+
+    Attributes:
+        lead: How far ahead of time ``target`` is, the control period, in s.
+        bend_rate: Largest rate of a or b of a ball, in rad/s.
+        travel_rate: Largest speed of the translation, in m/s.
+        dwell: At the beginning and at the end, in s.
+    """
+
+    lead: float = 0.02
+    bend_rate: float = 1.2
+    travel_rate: float = 0.010
+    dwell: float = 0.3
+
+    def check(self) -> None:
+        """Raises ValueError for a value that makes no sense."""
+        for name, value in vars(self).items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(
+                    f"procedure_player.{name}={value}: expected > 0; the default is "
+                    f"{getattr(ProcedurePlayerParams(), name)}"
+                )
+
+
+def schedule(x: NDArray[np.float64], params: ProcedurePlayerParams) -> NDArray:
+    """When each posture is reached, in s, (n,): instants of control, `lead` apart.
+
+    Args:
+        x: Postures (n, 7) as s, a1, b1, ..., b3.
+        params: Rates.
+    """
+    step = np.abs(np.diff(x, axis=0))
+    if len(step) == 0:
+        return np.array([params.dwell])
+    time = np.maximum(
+        step[:, 0] / params.travel_rate, step[:, 1:].max(axis=1) / params.bend_rate
+    )
+    # Whole control periods, so that no corner of the path falls between two instants.
+    time = np.maximum(np.ceil(time / params.lead - 1e-6), 1.0) * params.lead
+    start = math.ceil(params.dwell / params.lead) * params.lead
+    return start + np.concatenate([[0.0], np.cumsum(time)])
+
+
+class ProcedurePlayer(Block):
+    """Plays the postures of a plan, at the rates the robot can keep.
+
+    Between two postures the way is straight in the modules' angles, as it was
+    checked. The intermediate axis goes along, so the inverse kinematics finds the
+    planned posture again.
+
+    Port ``target`` emits p_WT [m], tool axis n_WT and intermediate axis n_WI,
+    channel frame W, ``lead`` ahead of time (9).
+
+    Port ``reference`` emits p_WT [m] and n_WT for this instant (6).
+
+    Port ``progress`` emits the index of the posture last reached (1).
+    """
+
+    def __init__(
+        self,
+        params: ProcedurePlayerParams | None = None,
+        snake: SnakeParams | None = None,
+        postures: ArrayLike | None = None,
+        first: int = 0,
+    ) -> None:
+        """Makes the block for a plan.
+
+        Args:
+            params: Rates.
+            snake: Geometry.
+            postures: As s, a1, b1, ..., b3, (n, 7); a short bend if None.
+            first: Index of the posture at which the robot stands: those before it
+                have been played.
+        """
+        super().__init__()
+        self._params = params or ProcedurePlayerParams()
+        self._params.check()
+        self._snake = (snake or SnakeParams()).check()
+        if postures is None:
+            postures = [[0.0] * 7, [0.002, 0.0, 0.1, 0.0, 0.1, 0.2, 0.1]]
+        self._x = np.array(postures, float)
+        if self._x.ndim != 2 or self._x.shape[1] != 7 or len(self._x) == 0:
+            raise ValueError(
+                f"postures have shape {self._x.shape}, expected (n, 7) with n > 0"
+            )
+        if not 0 <= first < len(self._x):
+            raise ValueError(f"first={first}: expected 0 to {len(self._x) - 1}")
+        self._first, self._x = first, self._x[first:]
+        self._times = schedule(self._x, self._params)
+        ticket = {self.time_ticket()}
+        self.vector_out("target", 9, self._calc_target, ticket)
+        self.vector_out("reference", 6, self._calc_reference, ticket)
+        self.vector_out("progress", 1, self._calc_progress, ticket)
+
+    @property
+    def duration(self) -> float:
+        """Of the whole plan in s, both dwells included."""
+        return float(self._times[-1]) + self._params.dwell
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """When each posture is reached in s, (n,); 0 for those played before."""
+        return np.concatenate([np.zeros(self._first), self._times])
+
+    def _pose(self, time: float) -> list[float]:
+        """p_WT, n_WT, n_WI (9) at a time."""
+        n = int(np.searchsorted(self._times, time))
+        if n == 0 or n == len(self._times):
+            x = self._x[min(n, len(self._x) - 1)]
+        else:
+            before, after = self._times[n - 1], self._times[n]
+            share = (time - before) / (after - before)
+            x = self._x[n - 1] + share * (self._x[n] - self._x[n - 1])
+        chain = frames(from_universal(x.tolist()), self._snake)
+        n_WT = chain[3][:3, 2]
+        p_WT = chain[3][:3, 3] + self._snake.tool_offset * n_WT
+        return [*p_WT.tolist(), *n_WT.tolist(), *chain[2][:3, 2].tolist()]
+
+    def _calc_target(self, context: Any) -> Sequence[float]:
+        return self._pose(context.get_time() + self._params.lead)
+
+    def _calc_reference(self, context: Any) -> Sequence[float]:
+        return self._pose(context.get_time())[:6]
+
+    def _calc_progress(self, context: Any) -> Sequence[float]:
+        reached = int(np.searchsorted(self._times, context.get_time() + 1e-9, "right"))
+        return [float(self._first + max(reached - 1, 0))]

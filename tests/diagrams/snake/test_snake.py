@@ -1,0 +1,131 @@
+"""The moving snake end to end: short runs of its scenarios."""
+
+import math
+
+import numpy as np
+import pytest
+
+from diagrams.common.run import run_scenario, simulate
+from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.snake.plots import plots
+
+
+def test_circle():
+    run = simulate(load_scenario("snake_circle", duration=5.0))
+    assert not run.error
+    figures = run.metrics
+    assert figures["rms_pose_error"] <= 0.2e-3
+    assert figures["max_axis_error"] <= math.radians(0.5)
+    assert figures["max_coupler_error"] <= 1e-5
+    assert figures["min_tension"] == pytest.approx(1.0)
+    assert figures["max_tension"] < 20.0
+    assert figures["false_alarms"] == figures["refused_poses"] == 0
+    assert np.abs(run.matrix("wires.residual")).max() < 1e-9
+    assert set(plots(run)) == {"path", "errors", "wires"}
+
+
+def test_reach():
+    run = simulate(load_scenario("snake_reach"))
+    assert not run.error
+    assert run.metrics["max_pose_error"] <= 1e-3
+    assert run.metrics["refused_poses"] == run.metrics["false_alarms"] == 0
+    assert (run.matrix("drums.limited") == 0.0).all()
+
+
+@pytest.fixture(scope="module")
+def break_run():
+    name = "snake_wire_break"
+    return simulate(
+        load_scenario(name, ["elastic.breaks=[{wire: 4, time: 1.01}]"], 1, 1.8)
+    )
+
+
+def test_a_broken_wire_is_noticed_and_motion_stops(break_run):
+    figures = break_run.metrics
+    assert not break_run.error
+    assert figures["false_alarms"] == 0
+    assert 0.0 < figures["break_detection_time"] <= 0.05
+    alarm = break_run.matrix("watch.alarm")[-1]
+    assert alarm[1] == 2.0
+    after = break_run.signals["time"] > alarm[0] + 0.02
+    lengths = break_run.matrix("drums.lengths")[after]
+    assert np.abs(np.diff(lengths, axis=0)).max() == 0.0
+    assert figures["min_tension"] > 0.5
+    residual = np.abs(break_run.matrix("wires.residual")[:, 1])
+    before = break_run.signals["time"] < 1.0
+    assert residual[before].max() < 1e-6  # all wires taut: they agree
+    assert residual[after].max() > 1e-3
+    assert "break" in plots(break_run)
+
+
+def test_elastic_wires_validate_the_drum_model(break_run):
+    """Until the wire snaps both models hold the tip within a tenth of a millimetre.
+
+    They differ by the drum model's stiffness (a module's own wires only) under the
+    snake's weight.
+    """
+    drums = simulate(load_scenario("snake_circle", duration=1.0))
+    elastic, stiff = (r.matrix("snake.tool")[:50, :3] for r in (break_run, drums))
+    apart = np.linalg.norm(elastic - stiff, axis=1).max()
+    assert 1e-6 < apart < 0.1e-3
+
+
+@pytest.mark.study
+def test_a_minute_without_false_alarm_then_a_broken_wire():
+    run = simulate(load_scenario("snake_wire_break"))
+    assert run.metrics["false_alarms"] == 0
+    assert 0.0 < run.metrics["break_detection_time"] <= 0.05
+
+
+@pytest.mark.parametrize("dead", range(9))
+def test_any_wire_that_snaps_is_noticed(dead):
+    breaks = [f"elastic.breaks=[{{wire: {dead}, time: 0.05}}]"]
+    run = simulate(load_scenario("snake_wire_break", breaks, 1, 0.14))
+    assert run.metrics["break_detection_time"] <= 0.05
+    assert run.matrix("watch.alarm")[-1, 1] == dead // 3 + 1
+
+
+def test_same_seed_same_result():
+    one, two = (simulate(load_scenario("snake_circle", duration=0.3)) for _ in "12")
+    for name in one.signals:
+        np.testing.assert_array_equal(one.signals[name], two.signals[name])
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("wires=rubber", "wires='rubber': choose from drums, elastic"),
+        ("period=0.0", r"period=0.0 s: expected > 0"),
+        ("snake.half_pitch=0.0045", r"tan\(max_bend/2\)=0.4142 >= R/\(2d\)=0.3750"),
+        ("snake.max_bend=0.9", r"max_bend=0.9000 rad must lie in \(0, pi/4\]"),
+        ("tip.circle.radius=0.05", "stopped by .*nearest reachable position"),
+        ("tip.circle.p_WC=[0, 0, 0.3]", "stopped by s_max"),
+        ("tip.circle.lean=1.7", "stopped by beta3"),
+        ("elastic.breaks=[{wire: 1, time: 0.5}]", "expected wires='elastic'"),
+        ("drive.kp=-1.0", "kp=-1.0 must be > 0"),
+    ],
+)
+def test_bad_input_is_refused_before_anything_runs(override, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("snake_circle", [override])
+
+
+@pytest.mark.browser
+def test_replay_shows_the_snake(tmp_path, screenshot):
+    run_scenario(load_scenario("snake_circle", duration=1.0), tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} >= {
+        "metrics.json",
+        "signals.csv",
+        "scenario.yaml",
+        "replay.html",
+        "path.png",
+        "errors.png",
+        "wires.png",
+    }
+    from matplotlib.image import imread
+
+    picture = imread(screenshot(tmp_path / "replay.html"))[..., :3]
+    red, green, blue = picture[..., 0], picture[..., 1], picture[..., 2]
+    assert ((red > 0.4) & (green < 0.3) & (blue < 0.3)).sum() > 50  # module 1's wires
+    assert ((blue > 0.4) & (red < 0.3)).sum() > 50  # module 3's wires
+    assert ((red > blue + 0.15) & (green > blue + 0.1)).sum() > 300  # brass balls

@@ -1,0 +1,168 @@
+"""The clearance constraint: the distance's rate, the promise, and the block."""
+
+import numpy as np
+import pytest
+
+from systems.bypass import clearance_constraint, obstacle_tools, workspace
+from systems.bypass.clearance_constraint import (
+    TOOLS,
+    ClearanceConstraint,
+    ClearanceConstraintParams,
+    constrain,
+    distance_rate,
+)
+from systems.bypass.obstacle_tools import Margins
+from systems.bypass.shadow_body import (
+    COLUMNS,
+    FULCRUM,
+    PLAN,
+    SAFE,
+    TIP,
+    VELOCITY,
+)
+from systems.bypass.workspace import WorkspaceParams
+from systems.common import geometry
+from tests.benchmarks.bypass_planners import NO_CONE
+from tests.benchmarks.kinematic_loop import estimate
+
+G = (0.0, 0.0, 0.0)
+RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
+ROOM = workspace.constants(WorkspaceParams(max_tilt=3.1, floor=-1.0))[0]
+NOT_DODGING = np.zeros(TOOLS)
+
+
+def tool(a, tip, v=(0.0, 0.0, 0.0), safe=0.007) -> np.ndarray:
+    """A row of obstacle tools."""
+    row = np.zeros(COLUMNS)
+    row[TIP : TIP + 3], row[FULCRUM : FULCRUM + 3] = tip, a
+    row[VELOCITY : VELOCITY + 3], row[SAFE], row[PLAN] = v, safe, safe + 0.0025
+    return row
+
+
+def moved(p, v, dt):
+    """A tool's tip after dt."""
+    return geometry.along(p, dt, v)
+
+
+def test_the_rate_agrees_with_finite_differences():
+    rng = np.random.default_rng(1)
+    dt, compared = 1e-6, 0
+    for _ in range(2000):
+        a, tip, p = (tuple(rng.uniform(-0.1, 0.1, 3)) for _ in range(3))
+        v_o, v = (tuple(rng.uniform(-0.1, 0.1, 3)) for _ in range(2))
+        rho, s, row, closing, _ = distance_rate(G, p, tool(a, tip, v_o))
+        fraction = geometry.closest_points(G, p, a, tip)[1]
+        if rho < 1e-3 or s < 1e-6 or fraction < 1e-6:  # a fulcrum is no material point
+            continue
+        before, after = (
+            geometry.closest_points(G, moved(p, v, k * dt), a, moved(tip, v_o, k * dt))[
+                2
+            ]
+            for k in (-1, 1)
+        )
+        rate = (after - before) / (2.0 * dt)
+        assert geometry.dot(row, v) - closing == pytest.approx(rate, abs=1e-5)
+        compared += 1
+    assert compared > 800
+
+
+def test_what_is_safe_passes_unchanged():
+    far = tool((0.1, 0.1, 0.0), (0.08, 0.1, -0.1))
+    wanted = (0.03, 0.01, -0.02)
+    v, _, status = constrain(
+        RECORD, ROOM, NO_CONE, G, (0.0, 0.0, -0.1), wanted, far[None], NOT_DODGING
+    )
+    assert v == pytest.approx(wanted, abs=1e-12)
+    assert status[1] == 0.0 and status[2] == 1.0 and status[4] < 1e-9
+
+
+def test_the_distance_is_held_against_a_tool_that_evasion_can_match():
+    """O sweeps the shaft's inside with less than s v: D_safe is kept."""
+    p, tip, dt = (0.0, 0.0, -0.12), (0.03, -0.02, -0.11), 1.0 / 240.0
+    a, v_o = (0.03, 0.09, 0.0), (-0.03, 0.0, 0.0)
+    low, dodging, held = 1.0, NOT_DODGING, True
+    for _ in range(600):
+        row = tool(a, tip, v_o)
+        v, dodging, status = constrain(
+            RECORD, ROOM, NO_CONE, G, p, (0.02, 0.0, 0.0), row[None], dodging
+        )
+        held = held and status[2] > 0.5
+        p, tip = moved(p, v, dt), moved(tip, v_o, dt)
+        low = min(low, geometry.closest_points(G, p, a, tip)[2])
+    assert held
+    assert low > 0.007 - 5e-5
+    assert p[0] < -0.01  # it was carried along
+
+
+def test_a_sweep_that_is_too_fast_is_told_and_dodged():
+    p, a, tip = (0.0, 0.0, -0.12), (0.02, 0.09, 0.0), (0.013, -0.05, -0.08)
+    row = tool(a, tip, (-0.2, 0.0, 0.0))
+    v, dodging, status = constrain(
+        RECORD, ROOM, NO_CONE, G, p, (0.0, 0.0, 0.0), row[None], NOT_DODGING
+    )
+    assert status[1] == 1.0 and status[2] == 0.0  # near, and the condition fails
+    assert dodging[0] == 1.0
+    assert v[0] < 0.0 and v[2] > 0.0  # away from O, and out of its way
+
+
+def test_the_borders_of_the_workspace_hold():
+    away = tool((0.3, 0.3, 0.0), (0.3, 0.3, -0.05))[None]
+    room = workspace.constants(WorkspaceParams(floor=-0.1, max_tilt=0.5))[0]
+    for p, wanted, axis in (
+        ((0.0, 0.0, -0.0999), (0.0, 0.0, -0.1), (0.0, 0.0, -1.0)),
+        ((0.0, 0.0, -0.0301), (0.0, 0.0, 0.1), (0.0, 0.0, 1.0)),
+    ):
+        v, _, _ = constrain(RECORD, room, NO_CONE, G, p, wanted, away, NOT_DODGING)
+        assert geometry.dot(v, axis) < 1e-3
+    tilted = (0.1 * np.sin(0.4999), 0.0, -0.1 * np.cos(0.4999))
+    v, _, _ = constrain(
+        RECORD, room, NO_CONE, G, tilted, (0.1, 0.0, 0.0), away, NOT_DODGING
+    )
+    assert v[0] < 0.07
+    angle = np.arctan2(tilted[0] + 0.01 * v[0], -(tilted[2] + 0.01 * v[2]))
+    assert angle < 0.5005
+
+
+def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
+    record = obstacle_tools.constants(Margins())[0]
+    o = estimate((0.0, 0.05, -0.1), (0.0, 0.1, 0.0))
+    s = estimate((0.05, 0.0, -0.1), (0.1, 0.0, 0.0))
+    c = estimate((0.0, -0.05, -0.05), (0.0, -0.1, 0.0))
+    sure = obstacle_tools.obstacle_tools(record, G, o, s, c)
+    assert sure.shape == (3, COLUMNS)
+    assert sure[0, SAFE] == Margins().safe_distance
+    assert sure[2, SAFE] == Margins().camera_distance
+    o[12], o[13] = 3e-4, 0.01
+    unsure = obstacle_tools.obstacle_tools(record, G, o, s, c)
+    extra = 3.0 * np.hypot(3e-4, 0.03 * 0.01)
+    assert unsure[0, SAFE] - sure[0, SAFE] == pytest.approx(extra)
+    # The final pose keeps the distance that is planned with from what is left of S.
+    end = tuple(sure[1, TIP : TIP + 3])
+    rho = geometry.closest_points(G, (0.05, 0.0, -0.1), (0.1, 0.0, 0.0), end)[2]
+    assert rho == pytest.approx(Margins().plan_distance + 1e-3, abs=1e-4)
+
+
+def test_bad_parameters_are_named():
+    with pytest.raises(ValueError, match=r"rate=-1.0 must be finite and >= 0"):
+        ClearanceConstraint(ClearanceConstraintParams(rate=-1.0))
+    with pytest.raises(ValueError, match=r"rate=60.0 /s is too fast"):
+        ClearanceConstraint(ClearanceConstraintParams(rate=60.0))
+    with pytest.raises(ValueError, match=r"plan_distance=0.005 m must be over"):
+        ClearanceConstraint(margins=Margins(plan_distance=0.005))
+    with pytest.raises(ValueError, match=r"max_tilt=40.0 rad .* is it in degrees"):
+        ClearanceConstraint(workspace=WorkspaceParams(max_tilt=40.0))
+
+
+def test_the_block_lets_pass_what_it_cannot_judge():
+    dut = ClearanceConstraint()
+    context = dut.CreateDefaultContext()
+    for index in range(dut.num_input_ports()):
+        port = dut.get_input_port(index)
+        port.FixValue(context, dut.AllocateInputVector(port).value())
+    lost = np.array(dut.GetInputPort("obstacle").Eval(context))
+    lost[15] = 0.0
+    dut.GetInputPort("obstacle").FixValue(context, lost)
+    wanted = [0.01, 0.02, 0.03]
+    dut.GetInputPort("v_R").FixValue(context, wanted)
+    np.testing.assert_allclose(dut.GetOutputPort("v_safe").Eval(context), wanted)
+    assert not np.any(dut.GetOutputPort("status").Eval(context))

@@ -1,0 +1,190 @@
+"""Tests of the joint commands: against Drake's own inverse kinematics, and limits."""
+
+import numpy as np
+from pydrake.multibody.inverse_kinematics import (
+    DifferentialInverseKinematicsParameters,
+    DoDifferentialInverseKinematics,
+)
+from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.analysis import Simulator
+import pytest
+
+from plants.arm.arm import SetPoint
+from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
+from plants.arm.parameters import READY_POSTURE
+from systems.motion import joint_commands
+from systems.motion.joint_commands import (
+    JointCommands,
+    JointCommandsParams,
+    free_velocity,
+    joint_velocity,
+)
+from tests.loosely import loosely
+
+tool_twist = loosely(joint_commands.tool_twist)
+
+PLANT = make_controller_plant()
+TIP = PLANT.GetFrameByName(INSTRUMENT_TIP)
+PERIOD = JointCommandsParams().period
+
+
+def kinematics(q):
+    """Context, tip position, shaft direction and Jacobian at a posture."""
+    context = PLANT.CreateDefaultContext()
+    PLANT.SetPositions(context, q)
+    X_WT = TIP.CalcPoseInWorld(context)
+    world = PLANT.world_frame()
+    J = PLANT.CalcJacobianSpatialVelocity(
+        context, JacobianWrtVariable.kV, TIP, np.zeros(3), world, world
+    )
+    return context, X_WT.translation(), X_WT.rotation().col(2), J
+
+
+def test_velocities_agree_with_drakes_own_inverse_kinematics():
+    rng = np.random.default_rng(1)
+    speed = np.ones(7)
+    limits = DifferentialInverseKinematicsParameters(7, 7)
+    limits.set_time_step(PERIOD)
+    limits.set_joint_velocity_limits((-speed, speed))
+    limits.set_nominal_joint_position(np.array(READY_POSTURE))
+    limits.set_joint_centering_gain(0.2 * np.eye(7))
+    for _ in range(30):
+        q = READY_POSTURE + rng.uniform(-0.2, 0.2, 7)
+        context, _, _, J = kinematics(q)
+        V = rng.uniform(-0.05, 0.05, 6)
+        ours = joint_velocity(J, V, 0.2 * (READY_POSTURE - q), -speed, speed)
+        drake = DoDifferentialInverseKinematics(PLANT, context, V, TIP, limits)
+        np.testing.assert_allclose(ours, drake.joint_velocities, atol=2e-3)
+        np.testing.assert_allclose(J @ ours, V, atol=1e-4)
+
+
+def random_problem(seed):
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(6, 7)), rng.normal(size=6), rng.normal(size=7)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_free_minimum_is_the_quadratic_programs_without_bounds(seed):
+    J, V, v_nominal = random_problem(seed)
+    wide = np.full(7, 1e3)
+    expected = joint_velocity(J, V, v_nominal, -wide, wide)
+    v = free_velocity(J, V, v_nominal)
+    np.testing.assert_allclose(v, expected, rtol=1e-6, atol=1e-8)
+    np.testing.assert_allclose(J @ v, V, atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounded_minimum_cannot_be_improved(seed):
+    J, V, v_nominal = random_problem(seed)
+    limit = 0.5 * abs(free_velocity(J, V, v_nominal)).max()
+    high = np.full(7, limit)
+    v = joint_velocity(J, V, v_nominal, -high, high)
+    assert abs(v).max() == pytest.approx(limit)
+    gradient = J.T @ (J @ v - V) + 1e-6 * (v - v_nominal)
+    inside = abs(v) < limit - 1e-9
+    np.testing.assert_allclose(gradient[inside], 0.0, atol=1e-6)
+    assert (gradient[~inside] * v[~inside] <= 1e-9).all()
+
+
+def test_bounds_hold_and_lead_back():
+    _, _, _, J = kinematics(READY_POSTURE)
+    low, high = -np.full(7, 0.1), np.full(7, 0.1)
+    v = joint_velocity(J, np.array([0.0, 0, 0, 1.0, 1.0, 0]), np.zeros(7), low, high)
+    assert v.max() <= 0.1 + 1e-9 and v.min() >= -0.1 - 1e-9
+    high[3] = -0.05  # the joint stands beyond its stop
+    v = joint_velocity(J, np.zeros(6), np.zeros(7), low, high)
+    assert v[3] <= -0.05 + 1e-9
+
+
+def test_twist_keeps_the_roll():
+    u = np.array([0.1, -0.2, -0.97])
+    u /= np.linalg.norm(u)
+    du = np.cross([0.3, 0.1, 0.2], u)
+    tool = [0.0, 0.0, -0.1, *u, 0.01, 0.0, 0.0, *du, 1.0]
+    w, v = tool_twist([0.0, 0.0, -0.1], u, tool, 1.0, PERIOD, 0.3)
+    twist = np.array([*w, *v])
+    assert twist[:3] @ u == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(np.cross(twist[:3], u), du, atol=1e-12)
+    np.testing.assert_allclose(twist[3:], [0.01, 0.0, 0.0])
+
+
+def follow(tool_at, seconds, params=None):
+    """Runs the block on a commanded motion; rows of posture, set-point, status."""
+    dut = JointCommands(params)
+    context = dut.CreateDefaultContext()
+    simulator = Simulator(dut, context)
+    rows = []
+    for k in range(round(seconds * 120)):
+        dut.GetInputPort("tool").FixValue(context, tool_at(k / 120))
+        simulator.AdvanceTo((k + 0.5) / 120)
+        names = ("posture", "set_point", "status")
+        rows.append([np.array(dut.GetOutputPort(n).Eval(context)) for n in names])
+    return rows
+
+
+def circle(t, radius=0.02, rate=2.0):
+    """A circle about the ready posture's tip, through the fulcrum at the origin."""
+    p = np.array([radius * np.sin(rate * t), radius * (1 - np.cos(rate * t)), -0.12])
+    v = radius * rate * np.array([np.cos(rate * t), np.sin(rate * t), 0.0])
+    q = np.linalg.norm(p)
+    u = p / q
+    return [*p, *u, *v, *((v - (v @ u) * u) / q), t]
+
+
+def test_the_posture_follows_a_circle_through_the_fulcrum():
+    rows = follow(circle, 3.0)
+    for k, (posture, _, status) in enumerate(rows[60:], start=60):
+        tool = np.array(circle((k + 1) / 120))
+        _, p, u, _ = kinematics(posture)
+        assert np.linalg.norm(p - tool[:3]) < 1e-4
+        assert np.linalg.norm(u - tool[3:6]) < 1e-3
+        assert status[0] == 0.0
+
+
+def test_set_points_are_the_servos_for_the_motion_and_the_weight():
+    (before, _, _), (after, set_point, _) = follow(circle, 0.5)[-2:]
+    context, *_ = kinematics(before)
+    weight = PLANT.CalcGravityGeneralizedForces(context)
+    v = (after - before) / PERIOD
+    expected = SetPoint(period=PERIOD)(before, v, -weight)
+    np.testing.assert_allclose(set_point, expected, atol=1e-9)
+
+
+def test_too_fast_a_command_is_reported_and_bounded():
+    def fast(t):
+        return [0.5 * t, 0.0, -0.12, 0, 0, -1, 0.5, 0, 0, 0, 0, 0, t]
+
+    rows = follow(fast, 0.3, JointCommandsParams(joint_speed=0.05))
+    speed = PLANT.GetVelocityUpperLimits() * 0.05
+    step = np.diff([posture for posture, _, _ in rows], axis=0) / PERIOD
+    assert (np.abs(step) <= speed + 1e-6).all()
+    assert rows[-1][2][0] == 1.0
+
+
+def test_quadprog_is_asked_only_where_bounds_are_met(monkeypatch):
+    asked = []
+
+    def watched(*args):
+        asked.append(args)
+        return joint_velocity(*args)
+
+    monkeypatch.setattr(joint_commands, "joint_velocity", watched)
+    follow(circle, 0.1)
+    assert not asked
+    follow(circle, 0.1, JointCommandsParams(joint_speed=0.01))
+    assert asked
+
+
+def test_a_command_that_is_no_number_holds_the_arm():
+    rows = follow(lambda t: [np.nan] * 13, 0.1)
+    np.testing.assert_allclose(rows[-1][0], READY_POSTURE)
+    assert rows[-1][2][0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("period", 0.0), ("gain", 1.5), ("joint_speed", 0.0), ("joint_margin", -1.0)],
+)
+def test_bad_parameters_are_named(name, value):
+    with pytest.raises(ValueError, match=name):
+        JointCommands(JointCommandsParams(**{name: value}))

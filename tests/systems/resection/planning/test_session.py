@@ -1,0 +1,150 @@
+"""Sessions: what is feasible, why not, commits, undo, and files."""
+
+import numpy as np
+import pytest
+
+from plants.snake.parameters import SnakeParams
+from plants.tissue.space import SOLID
+from plants.tissue.volume import TUMOUR
+from systems.common.archive import before
+from systems.resection.planning.entry_law import (
+    least_clearance,
+    least_radius,
+    opening_ratio,
+)
+from systems.resection.planning.procedure import (
+    Procedure,
+    Tool,
+    load_procedures,
+    save_procedures,
+)
+from systems.resection.planning.session import load_session
+
+ENTRY = Procedure("entry", length=0.016, radius=0.005, pitch=1e-3, name="entry")
+
+
+def test_entry_law_has_the_paper_robot_numbers():
+    """Worked by hand with h = 3.2, e = 1, r_b = 4 mm (reference page, 1.4)."""
+    thin = SnakeParams(tool_offset=6e-3, tool_radius=3e-3)
+    assert opening_ratio(thin) == pytest.approx(31.2 / 13.8)
+    assert least_clearance(thin) == pytest.approx(0.79e-3, abs=0.01e-3)
+    assert least_radius(thin) == pytest.approx(5.7e-3, abs=0.05e-3)
+    assert least_clearance(SnakeParams()) == 0.0
+
+
+def test_check_changes_nothing_and_commit_does(ball_session):
+    session = ball_session()
+    tau = session.volume.tau.copy()
+    answer = session.check(ENTRY)
+    assert answer.feasible and answer.gained > 0
+    np.testing.assert_array_equal(session.volume.tau, tau)
+    assert session.commit(ENTRY).gained == pytest.approx(answer.gained)
+    gone = (session.volume.tau != SOLID) & (session.volume.labels == TUMOUR)
+    assert gone.sum() * session.volume.voxel == pytest.approx(answer.gained)
+    assert session.undo().name == "entry"
+    np.testing.assert_array_equal(session.volume.tau, tau)
+    assert session.tree.size.tolist() == [1, 1]
+    with pytest.raises(ValueError, match="no step to undo"):
+        session.undo()
+
+
+def test_arrival_times_replay_the_plan(ball_session):
+    """Stamping the route's postures in their order frees just what was planned."""
+    session = ball_session()
+    assert session.commit(ENTRY).feasible
+    tau = session.volume.tau
+    points = session.volume.points(np.ones(tau.shape, bool))
+    tips = session.tips
+    planned = np.flatnonzero((tau != SOLID) & (tau > 0))
+    rng = np.random.default_rng(0)
+    for voxel in rng.choice(planned, 100):
+        time = tau.reshape(-1)[voxel]
+        a, b = tips[time - 1], tips[time]
+        share = np.clip(
+            (points[voxel] - a) @ (b - a) / max((b - a) @ (b - a), 1e-18), 0, 1
+        )
+        nearest = np.linalg.norm(points[voxel] - a - share * (b - a))
+        assert nearest <= session.params.tool_radius + 1e-5
+
+
+@pytest.mark.parametrize(
+    ("procedure", "reason"),
+    [
+        (Procedure("entry", length=0.040, radius=0.005, pitch=1e-3), "tool outside"),
+        (
+            Procedure("elementary", [0, 0, 0.022], [0, 0, 1.0], 0.002, 0.005),
+            "never freed",
+        ),
+        (Procedure("entry", length=0.01, radius=0.03), "limit"),
+        (Procedure("entry", length=0.2, radius=0.005), "limit"),
+        (Procedure("entry", tool=Tool(0.0025, 0.004)), "jam"),
+    ],
+)
+def test_refusals_name_their_reason(ball_session, procedure, reason):
+    session = ball_session()
+    answer = session.check(procedure)
+    assert not answer.feasible
+    assert answer.reason == reason
+    assert answer.text and answer.gap >= 0.0
+    assert not session.commit(procedure).feasible
+    assert session.steps == [] and session.fraction == 0.0
+
+
+def test_a_session_survives_being_killed(ball_session, tmp_path):
+    file = tmp_path / "a.session"
+    session = ball_session()
+    session.file = file
+    session.commit(ENTRY)
+    wider = Procedure("entry", length=0.012, radius=0.012, clipped=True, name="wider")
+    assert session.commit(wider).feasible
+    again = load_session(file)
+    assert [step.name for step in again.steps] == ["entry", "wider"]
+    np.testing.assert_array_equal(again.volume.tau, session.volume.tau)
+    np.testing.assert_array_equal(again.postures, session.postures)
+    again.undo()
+    assert [step.name for step in load_session(file).steps] == ["entry"]
+
+
+def test_a_damaged_file_is_refused_and_the_one_before_offered(ball_session, tmp_path):
+    file = tmp_path / "a.session"
+    session = ball_session()
+    session.save(file)
+    session.commit(ENTRY)
+    session.save(file)
+    raw = bytearray(file.read_bytes())
+    raw[len(raw) // 2] ^= 255
+    file.write_bytes(raw)
+    with pytest.raises(ValueError, match=r"damaged; the one before it is whole: .*"):
+        load_session(file)
+    assert load_session(before(file)).steps == []
+    file.write_bytes(b"")
+    with pytest.raises(ValueError, match="damaged"):
+        load_session(file)
+    with pytest.raises(ValueError, match="no session"):
+        load_session(tmp_path / "none.session")
+
+
+def test_procedures_are_saved_and_loaded(tmp_path):
+    rows = [ENTRY, Procedure("volume", [0, 0, 0.01], [0, 0, 1], 0.0, tool=Tool())]
+    save_procedures(rows, tmp_path / "p.json")
+    assert load_procedures(tmp_path / "p.json") == rows
+    (tmp_path / "bad.json").write_text("{")
+    with pytest.raises(ValueError, match="holds no procedures"):
+        load_procedures(tmp_path / "bad.json")
+
+
+@pytest.mark.parametrize(
+    ("procedure", "message"),
+    [
+        (Procedure("entri"), "kind='entri'"),
+        (Procedure("elementary"), "position=None, expected three"),
+        (Procedure("entry", position=[0, 0, 0]), "the channel's"),
+        (Procedure("elementary", [0, 0, 0], [0, 0, 0]), "no direction"),
+        (Procedure("entry", radius=0.003), "less than the tool's own"),
+        (Procedure("entry", length=-1.0), "length=-1.0"),
+        (Procedure("entry", pitch=0.0), "pitch=0.0"),
+    ],
+)
+def test_bad_procedures(ball_session, procedure, message):
+    with pytest.raises(ValueError, match=message):
+        ball_session().check(procedure)

@@ -1,0 +1,115 @@
+"""The tool's wrench against the plant's own bushing, and the sensor's faults."""
+
+import functools
+
+import numpy as np
+from pydrake.multibody.math import SpatialForce
+import pytest
+
+from diagrams.common.run import simulate
+from diagrams.common.scenario import load_scenario
+from diagrams.wrist.diagram import make_wrist_diagram
+from systems.sensing import sensor_noise
+from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
+
+QUIET = [
+    f"tool_wrench.{name}=0.0"
+    for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+]
+
+
+@functools.cache
+def quiet_run():
+    run = simulate(load_scenario("pwe_arc", QUIET, duration=1.5))
+    assert not run.error
+    return run
+
+
+def test_a_quiet_sensor_reads_the_walls_force_while_the_arm_moves():
+    run = quiet_run()
+    f, u = run.matrix("wrist.wrench")[:, :3], run.matrix("wrist.shaft")[:, 3:6]
+    lateral = f - u * np.sum(f * u, axis=1)[:, None]
+    force = run.matrix("wall.force")
+    late = run.signals["time"] > 0.1
+    assert np.linalg.norm(force[late], axis=1).max() > 0.9  # the probe
+    np.testing.assert_allclose(lateral[late], force[late], atol=2e-3)
+
+
+def test_the_moment_tells_the_contacts_depth():
+    run = quiet_run()
+    u, s = run.matrix("wrist.shaft")[:, 3:6], run.matrix("wrist.shaft")[:, :3]
+    f, m = run.matrix("wrist.wrench")[:, :3], run.matrix("wrist.wrench")[:, 3:6]
+    force = run.matrix("wall.force")
+    loaded = np.linalg.norm(force, axis=1) > 0.8
+    lever = np.sum(np.cross(u, f) * m, axis=1) / np.sum(np.cross(u, f) ** 2, axis=1)
+    true = np.sum(u * (run.matrix("wall.fulcrum")[:, :3] - s), axis=1)
+    np.testing.assert_allclose(lever[loaded], true[loaded], atol=5e-4)
+
+
+def test_noise_is_a_function_of_seed_and_sample():
+    faults = ((0.05,) * 3 + (0.005,) * 3, (0.0,) * 6, (0.0,) * 6)
+    rows = np.array([sensor_noise.fault(4, i, faults) for i in range(5000)])
+    np.testing.assert_allclose(rows.std(axis=0), faults[0], rtol=0.05)
+    np.testing.assert_array_equal(rows[3210], sensor_noise.fault(4, 3210, faults))
+    assert abs(np.corrcoef(rows[:-1, 0], rows[1:, 0])[0, 1]) < 0.05
+    assert not np.array_equal(rows[0], sensor_noise.fault(5, 0, faults))
+
+
+def test_drift_goes_on_across_blocks():
+    faults = ((0.0,) * 6, (1.0,) * 6, (0.0,) * 6)
+    rows = np.array([sensor_noise.fault(4, i, faults) for i in range(3000)])
+    steps = np.diff(rows, axis=0)
+    np.testing.assert_allclose(steps.std(axis=0), 1.0, rtol=0.1)
+    assert np.abs(steps).max() < 5.5
+
+
+def read(dut: ToolWrench, force: SpatialForce | None = None, time: float = 0.0):
+    context = dut.CreateDefaultContext()
+    context.SetTime(time)
+    for index in range(dut.num_input_ports()):
+        port = dut.get_input_port(index)
+        port.FixValue(context, dut.AllocateInputAbstract(port))
+    if force is not None:
+        dut.GetInputPort("reaction_forces").FixValue(context, [force])
+    return dut.GetOutputPort("wrench").Eval(context)
+
+
+def test_taring_takes_the_offset_away():
+    kind = dict.fromkeys(("force_noise", "force_drift", "moment_drift"), 0.0)
+    tared = read(ToolWrench(ToolWrenchParams(**kind, moment_noise=0.0)))
+    left = read(ToolWrench(ToolWrenchParams(**kind, moment_noise=0.0, tare_samples=0)))
+    np.testing.assert_allclose(tared[:3] - left[:3], 0.3, atol=1e-9)
+
+
+def test_saturated_silent_and_nan_are_not_valid():
+    push = SpatialForce([0.0, 0.0, 0.0], [100.0, 0.0, 0.0])
+    hole = SpatialForce([0.0, 0.0, 0.0], [float("nan"), 0.0, 0.0])
+    assert read(ToolWrench())[6] == 1.0
+    assert not read(ToolWrench(), push).any()
+    assert not read(ToolWrench(), hole).any()
+    dut = ToolWrench(ToolWrenchParams(lost=[1.0, 2.0]))
+    assert [read(dut, time=t)[6] for t in (0.5, 1.5, 2.5)] == [1.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"force_noise": -0.1}, "force_noise=-0.1: expected >= 0"),
+        ({"lost": [1.0]}, "rising times in pairs"),
+        ({"delay": -1}, "delay=-1"),
+        ({"mass_error": 3.0}, "mass_error=3.0"),
+    ],
+)
+def test_bad_input(change, message):
+    with pytest.raises(ValueError, match=message):
+        ToolWrench(ToolWrenchParams(**change))
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [("nozzle", "nozzle.*does not exist.*instrument"), ("link7", "weld joint")],
+)
+def test_a_sensor_frame_that_cannot_be(frame, message):
+    scenario = load_scenario("pwe_arc", [f"tool_wrench.frame={frame}"])
+    with pytest.raises(ValueError, match=message):
+        make_wrist_diagram(scenario)

@@ -1,0 +1,295 @@
+"""Trajectory estimator: accuracy, honesty, lost sight, and what it refuses."""
+
+import math
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
+import pytest
+from scipy.linalg import expm
+
+from plants.surgeon.recording import SWEEP_VIA, synthesize_sweep
+from plants.surgeon.surgeon_tool import SurgeonTool, SurgeonToolParams
+from plants.surgeon.tool_motion import (
+    recorded_motion,
+    tremor_motion,
+    waypoint_motion,
+)
+from systems.sensing.optical_tracker import (
+    MarkerBody,
+    OpticalTracker,
+    OpticalTrackerParams,
+    disturb,
+)
+from systems.sensing.trajectory_estimator import (
+    TrajectoryEstimator,
+    TrajectoryEstimatorParams,
+    absorb,
+    constants,
+    initial,
+    predict,
+)
+
+DT = 1.0 / 60.0
+BODY = MarkerBody()
+G = [0.0, 0.09, 0.0]
+
+
+def shaft(tip):
+    u = [p - g for p, g in zip(tip, G, strict=True)]
+    length = math.hypot(*u)
+    return [*tip, *(x / length for x in u)]
+
+
+def track(motion, seed, params=None, seconds=20.0, hidden=(), tremor=1e-4):
+    """Errors, true speed and stated figures at the planner's instants.
+
+    A frame exposed at t is read at t + 1/60, where the estimate is compared with the
+    truth of that instant, as in the diagram.
+    """
+    params = params or TrajectoryEstimatorParams()
+    dut = constants(params)[0]
+    rng = np.random.default_rng(seed)
+    shake = tremor_motion(tremor, seed) if tremor else lambda t: (0.0,) * 6
+    x = initial(params)
+    rows = []
+    for k in range(round(seconds / DT)):
+        t = k * DT
+        tip = [p + d for p, d in zip(motion(t)[:3], shake(t)[:3], strict=True)]
+        m = disturb(
+            np.array(shaft(tip)),
+            rng.standard_normal(6),
+            BODY.lever,
+            BODY.sigma_position(),
+            BODY.sigma_direction(),
+        )
+        valid = not any(start <= t < end for start, end in hidden)
+        x = absorb(dut, x, np.array([*m, t, float(valid)]))
+        estimate = predict(dut, x, t + DT)
+        now, d = motion(t + DT), shake(t + DT)
+        e_p = [estimate[i] - now[i] - d[i] for i in range(3)]
+        e_v = [estimate[3 + i] - now[3 + i] for i in range(3)]
+        rows.append([*e_p, *e_v, math.hypot(*now[3:]), *estimate[12:17]])
+    return np.array(rows)
+
+
+def rms(errors):
+    return math.sqrt((errors**2).sum(axis=1).mean())
+
+
+def hand(seed):
+    return recorded_motion(
+        *synthesize_sweep(seed, SWEEP_VIA, rate=60.0, tremor_rms=0.0)
+    )
+
+
+def test_hand_like_motion_is_followed_and_the_sigmas_are_honest():
+    rows = np.vstack([track(hand(s), s)[120:] for s in range(4)])
+    e_p, e_v, sigma_p, sigma_v = rms(rows[:, :3]), rms(rows[:, 3:6]), *rows[:, 7:9].T
+    # The tracker alone: 0.25/2 sqrt(1 + 2/3 (350/35)^2) = 1.0 mm.
+    assert e_p < 0.35e-3
+    assert e_v < 7e-3
+    assert 0.6 < e_p / math.sqrt(3.0 * (sigma_p**2).mean()) < 1.1
+    assert 0.6 < e_v / math.sqrt(3.0 * (sigma_v**2).mean()) < 1.1
+    assert rows[:, 10].all()  # never lost
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.03, 0.06])
+def test_obstacle_speeds_are_followed(speed):
+    # Across the way and back, peak speed 15/8 of the mean.
+    leg = 1.875 * 0.06 / speed
+    there, back = [-0.03, 0.0, -0.11], [0.03, 0.0, -0.11]
+    motion = waypoint_motion([3.0, 3.0 + leg, 3.0 + 2 * leg], [there, back, there])
+    rows = track(motion, 1, seconds=3.0 + 2 * leg)[180:]
+    fast = rows[rows[:, 6] > 0.5 * speed]
+    assert rows[:, 10].all()
+    assert rms(rows[:, :3]) < 0.4e-3
+    assert rms(fast[:, 3:6]) < 6e-3
+
+
+def test_filter_is_consistent_when_its_model_holds():
+    """NEES over position, velocity and acceleration in a Monte Carlo of 80 runs."""
+    sigma, tau, s = 0.1, 0.25, BODY.sigma_position()
+    # Without a lever the noise is the markers' mean's, the same along all axes, and
+    # the fulcrum, which lies behind, has no say.
+    params = TrajectoryEstimatorParams(
+        body=MarkerBody(lever=0.0),
+        sigma_acceleration=sigma,
+        acceleration_time=tau,
+        tremor_rms=0.0,
+        fulcrum=[0.0, 0.0, 0.0],
+    )
+    dut = constants(params)[0]
+    A = np.array([[0, 1, 0], [0, 0, 1], [0, 0, -1 / tau]])
+    Phi = expm(A * DT)
+    W = np.zeros((3, 3))
+    W[2, 2] = 2 * sigma**2 / tau
+    block = expm(np.block([[-A, W], [np.zeros((3, 3)), A.T]]) * DT)
+    # Scaled, because position's variance in one step is below Cholesky's reach.
+    root = np.linalg.cholesky(Phi @ block[:3, 3:] + 1e-20 * np.eye(3))
+    rng = np.random.default_rng(11)
+    nees = []
+    for _ in range(80):
+        truth = np.zeros((3, 3))  # rows p, v, a; columns x, y, z
+        truth[1] = rng.normal(0.0, params.sigma_velocity, 3)
+        truth[2] = rng.normal(0.0, sigma, 3)
+        x = initial(params)
+        for k in range(90):
+            seen = truth[0] + rng.normal(0.0, s, 3)
+            m = np.array([*seen, 0.0, 0.0, -1.0, k * DT, 1.0])
+            x = absorb(dut, x, m)
+            if k < 89:
+                truth = Phi @ truth + root @ rng.standard_normal((3, 3))
+        assert x[27] == 89 * DT
+        pp, pv, pa, vv, va, aa = x[9:15]
+        P = np.array([[pp, pv, pa], [pv, vv, va], [pa, va, aa]])
+        error = np.array(x[:9]).reshape(3, 3) - truth
+        nees.append(np.trace(error.T @ np.linalg.solve(P, error)))
+    # chi-square with 9 degrees of freedom: mean 9, 4 standard errors of 80 runs.
+    assert np.mean(nees) == pytest.approx(9.0, abs=4 * math.sqrt(18 / 80))
+
+
+def test_lost_sight_is_ridden_through_then_unknown_then_resumed():
+    motion = waypoint_motion([0.0, 6.0], [[-0.04, 0.0, -0.11], [0.04, 0.0, -0.11]])
+    rows = track(motion, 2, seconds=6.0, hidden=[(3.0, 4.5)])
+    t = (np.arange(len(rows)) + 1) * DT
+    known, sigma, age = rows[:, 10], rows[:, 7], rows[:, 11]
+    error = np.sqrt((rows[:, :3] ** 2).sum(axis=1))
+    lost = t[(known == 0.0) & (t > 1.0)]
+    # It says so within 0.2 to 0.5 s, before the tip is 3 sigma_limit off.
+    assert 3.2 < lost[0] < 3.5
+    assert lost[-1] < 4.5 + 3 * DT
+    assert error[(known == 1.0) & (t > 0.2)].max() < 0.009
+    blind = (t > 3.0 + 2 * DT) & (t < 4.5)
+    assert (np.diff(sigma[blind]) > 0.0).all()
+    np.testing.assert_allclose(np.diff(age[blind]), DT, atol=1e-9)
+    assert (error[blind] < 4.0 * sigma[blind] * math.sqrt(3.0)).all()
+    assert rms(rows[t > 5.0][:, :3]) < 0.4e-3
+
+
+def test_short_loss_passes_unnoticed():
+    motion = waypoint_motion([0.0, 6.0], [[-0.04, 0.0, -0.11], [0.04, 0.0, -0.11]])
+    rows = track(motion, 3, seconds=5.0, hidden=[(3.0, 3.1)])
+    assert rows[30:, 10].all()
+
+
+@pytest.fixture
+def settled():
+    params = TrajectoryEstimatorParams(fulcrum=G)
+    dut, x = constants(params)[0], initial(params)
+    for k in range(60):
+        x = absorb(dut, x, np.array([*shaft([0.0, 0.0, -0.12]), k * DT, 1.0]))
+    return dut, x
+
+
+@pytest.mark.parametrize(
+    "measurement",
+    [
+        [*shaft([0.0, 0.0, -0.12]), 1.0, 0.0],  # invalid
+        [*shaft([0.0, 0.0, -0.12]), 59 * DT, 1.0],  # seen before
+        [*shaft([0.0, 0.0, -0.12]), 0.5, 1.0],  # older
+        [*shaft([0.03, 0.0, -0.12]), 1.0, 1.0],  # 30 mm in one frame
+        [math.nan, *shaft([0.0, 0.0, -0.12])[1:], 1.0, 1.0],
+        [*shaft([0.0, 0.0, -0.12])[:5], math.nan, 1.0, 1.0],
+        [0.0, 0.0, -0.12, 0.0, 0.0, 0.0, 1.0, 1.0],  # no direction
+        [*shaft([0.0, 0.0, -0.12]), math.nan, 1.0],
+        [*shaft([0.0, 0.0, -0.12]), 1.0, math.nan],
+        [*shaft([0.0, 0.0, -0.12]), math.inf, 1.0],
+    ],
+)
+def test_bad_measurement_changes_nothing(settled, measurement):
+    dut, x = settled
+    after = absorb(dut, x, np.array(measurement))
+    np.testing.assert_array_equal(after, x)
+
+
+def test_tool_that_really_jumped_is_found_again(settled):
+    dut, x = settled
+    for k in range(60, 100):
+        x = absorb(dut, x, np.array([*shaft([0.03, 0.0, -0.12]), k * DT, 1.0]))
+    estimate = predict(dut, x, 100 * DT)
+    np.testing.assert_allclose(estimate[:3], [0.03, 0.0, -0.12], atol=1e-3)
+    assert estimate[15] == 1.0
+
+
+def test_nothing_is_known_before_the_first_frame():
+    params = TrajectoryEstimatorParams()
+    estimate = predict(constants(params)[0], initial(params), 0.0)
+    assert np.isfinite(estimate).all()
+    assert estimate[15] == 0.0
+
+
+def test_block_has_the_frame_in_the_estimate_of_the_same_instant():
+    dut = TrajectoryEstimator(TrajectoryEstimatorParams(fulcrum=G))
+    context = dut.CreateDefaultContext()
+    port = dut.GetInputPort("measurement")
+    output = dut.GetOutputPort("estimate")
+    port.FixValue(context, [*shaft([0.0, 0.0, -0.12]), 0.5, 1.0])
+    context.SetTime(0.5)
+    before = context.get_discrete_state(0).value().copy()
+    estimate = output.Eval(context)
+    np.testing.assert_allclose(estimate[:3], [0.0, 0.0, -0.12], atol=1e-9)
+    np.testing.assert_allclose(estimate[9:12], G)
+    assert estimate[16] == 0.0
+    # Reading it changed no state; time alone makes it older.
+    np.testing.assert_array_equal(context.get_discrete_state(0).value(), before)
+    context.SetTime(0.6)
+    assert output.Eval(context)[16] == pytest.approx(0.1)
+    assert output.Eval(context)[12] > estimate[12]
+    # Storing the state changes nothing in what is put out.
+    shown = output.Eval(context).copy()
+    updated = dut.EvalUniquePeriodicDiscreteUpdate(context).value().copy()
+    context.SetDiscreteState(0, updated)
+    np.testing.assert_array_equal(output.Eval(context), shown)
+
+
+def test_latency_is_made_up_for_in_the_diagram():
+    """Tool, tracker and estimator wired up, at the instants of the planner."""
+    builder = DiagramBuilder()
+    params = SurgeonToolParams(
+        p_WG=G, times=[0.0, 4.0], points=[[-0.04, 0.0, -0.11], [0.04, 0.0, -0.11]]
+    )
+    tool = builder.AddNamedSystem("tool", SurgeonTool(params))
+    tracker = builder.AddNamedSystem(
+        "tracker",
+        OpticalTracker(OpticalTrackerParams(latency=0.03, body=MarkerBody(noise=0.0))),
+    )
+    zeros = builder.AddNamedSystem("zeros", ConstantVectorSource(np.zeros(12)))
+    dut = builder.AddNamedSystem("dut", TrajectoryEstimator())
+    for name in "SO":
+        builder.Connect(tool.GetOutputPort("shaft"), tracker.GetInputPort(name))
+    builder.Connect(zeros.get_output_port(), tracker.GetInputPort("noise"))
+    builder.Connect(
+        tracker.GetOutputPort("O_measured"), dut.GetInputPort("measurement")
+    )
+    ports = dut.GetOutputPort("estimate"), tool.GetOutputPort("shaft")
+    logs = [LogVectorOutput(port, builder, publish_period=DT) for port in ports]
+    simulator = Simulator(builder.Build())
+    simulator.AdvanceTo(4.0)
+    estimate, shafts = (log.FindLog(simulator.get_context()).data().T for log in logs)
+    # Two periods old, and yet where the tool is now: it has moved 1.2 mm since.
+    np.testing.assert_allclose(estimate[5:, 16], 2 * DT, atol=1e-9)
+    error = np.linalg.norm(estimate[60:, :3] - shafts[60:, :3], axis=1)
+    assert error.max() < 0.1e-3
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"period": 0.0}, "period=0.0"),
+        ({"sigma_acceleration": -0.1}, "sigma_acceleration"),
+        ({"acceleration_time": math.nan}, "acceleration_time"),
+        ({"gate": 0.0}, "gate"),
+        ({"sigma_limit": math.inf}, "sigma_limit"),
+        ({"age_limit": 0.001}, "at least the period"),
+        ({"tremor_rms": -1e-4}, "tremor_rms"),
+        ({"wall_height": math.nan}, "wall_height"),
+        ({"fulcrum": [0.0, 0.0]}, "fulcrum.*or null"),
+        ({"fulcrum": [0.0, 0.0, math.nan]}, "fulcrum.*or null"),
+        ({"body": MarkerBody(lever=math.nan)}, "lever"),
+    ],
+)
+def test_bad_parameters_are_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        TrajectoryEstimator(TrajectoryEstimatorParams(**changes))
