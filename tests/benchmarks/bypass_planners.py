@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from systems.auto_guidance import (
+from systems.bypass import (
     clearance_constraint,
     obstacle_tools,
     tool_bypass,
