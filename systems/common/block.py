@@ -8,6 +8,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
 from systems.common.compiled import Numbers
+from systems.common.signal import example, flat, size
 from systems.common.stopwatch import STOPWATCH
 
 
@@ -37,10 +38,41 @@ class Block(LeafSystem):
     """A digital controller.
 
     Physics is continuous and native to Drake; a block has its own period and
-    keeps its state in the context. Each vector input is declared with an
-    *example*: a physically sensible value that documents shape and units, and
-    that the contract test feeds to the block.
+    keeps its state in the context. Its ports are declared with the signals they carry
+    (`systems.common.signal`).
+
+    Attributes:
+        signals: Every vector port's signal, by the port's name.
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.signals: dict[str, Any] = {}
+
+    def signal_in(self, name: str, signal: Any) -> Any:
+        """Declares an input port of a signal and returns it."""
+        self.signals[name] = signal
+        return self.vector_in(name, flat(example(signal)).tolist())
+
+    def signal_out(
+        self,
+        name: str,
+        signal: Any,
+        calc: Callable[[Any], Numbers],
+        prerequisites: set[Any],
+    ) -> Any:
+        """Declares an output port of a signal computed by `calc(context)`.
+
+        Args:
+            name: The port's name.
+            signal: What it emits.
+            calc: Returns the elements for a context; an array is taken over several
+                times faster than a list.
+            prerequisites: Tickets of all that `calc` reads, so that the value
+                is cached and feedthrough is known.
+        """
+        self.signals[name] = signal
+        return self.vector_out(name, size(signal), calc, prerequisites)
 
     def vector_in(self, name: str, example: Sequence[float]) -> Any:
         """Declares a vector input port and returns it.
@@ -79,18 +111,20 @@ class Block(LeafSystem):
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
 
-    def state_out(self, name: str, initial: Sequence[float] | np.ndarray) -> Any:
+    def state_out(self, name: str, signal: Any, initial: np.ndarray) -> Any:
         """Declares a group of discrete state that is an output port as well.
 
         Cheaper than a computed output, and never feedthrough.
 
         Args:
             name: The port's name.
-            initial: The state's initial value; its length is the port's size.
+            signal: What it emits.
+            initial: The state's initial value.
 
         Returns:
             The group's index.
         """
+        self.signals[name] = signal
         group = self.DeclareDiscreteState(np.array(initial, float))
         self.DeclareStateOutputPort(name, group)
         return group

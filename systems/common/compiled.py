@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 import hashlib
+import inspect
 from pathlib import Path
 import sys
 from typing import Any
@@ -50,6 +51,21 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = before
     return result
+
+
+def generated(source: str, name: str, home: Any, names: dict[str, Any]) -> Any:
+    """Compiles a function from its source text.
+
+    Args:
+        source: Of one function.
+        name: Its name.
+        home: A function or class of the file that it counts as part of.
+        names: What the source refers to.
+    """
+    scope = {**names, "__name__": home.__module__}
+    file = inspect.getfile(getattr(home, "py_func", home))
+    exec(compile(source, file, "exec"), scope)
+    return compiled(scope[name])
 
 
 class _Announcer(Listener):

@@ -7,8 +7,7 @@ as tuples. Lengths in meters.
 from math import isfinite, sqrt
 
 from systems.common.compiled import Numbers, compiled
-
-type Vector = tuple[float, float, float]
+from systems.common.signal import Vector
 
 # Below this share of |d1|^2 |d2|^2 two directions count as parallel
 # (sin^2 of their angle; 1e-12 is an angle of 1e-6 rad).
@@ -54,9 +53,27 @@ def sub(a: Numbers, b: Numbers) -> Vector:
 
 
 @compiled
+def plus(a: Numbers, b: Numbers) -> Vector:
+    """The sum a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compiled
+def scaled(t: float, a: Numbers) -> Vector:
+    """The product t a."""
+    return t * a[0], t * a[1], t * a[2]
+
+
+@compiled
 def along(p: Numbers, t: float, d: Numbers) -> Vector:
     """The point p + t d."""
     return p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
+
+
+@compiled
+def across(a: Numbers, u: Numbers) -> Vector:
+    """The part of a that is perpendicular to the unit vector u."""
+    return along(a, -dot(a, u), u)
 
 
 @compiled
