@@ -16,10 +16,11 @@ from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 import hashlib
 from importlib.util import find_spec
+import inspect
 import marshal
 from pathlib import Path
 import sys
-from types import CodeType
+from types import CodeType, FunctionType
 from typing import Any
 
 import numba
@@ -39,8 +40,9 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     """
     before = numba.config.CACHE_LOCATOR_CLASSES
     numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.InTree,{__name__}.UserWide"
+    filed = Path(function.__code__.co_filename).is_file()  # not in a notebook
     try:
-        result: Any = numba.njit(cache=True, error_model="numpy")(function)
+        result: Any = numba.njit(cache=filed, error_model="numpy")(function)
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = before
     return result
@@ -118,15 +120,30 @@ def _words(code: CodeType) -> frozenset[str]:
     return frozenset(code.co_names).union(*inner)
 
 
-def _stamp(function: Callable[..., Any]) -> str:
+def _origins(function: FunctionType) -> list[tuple[str, frozenset[str]]]:
+    """Files, and the names in them that a function begins with."""
+    words = _words(function.__code__) | {function.__name__}
+    found = [(function.__code__.co_filename, words)]
+    names = function.__globals__
+    if names is not vars(sys.modules[function.__module__]):  # it is generated
+        values: list[Any] = [names.get(word) for word in words]
+        for value in values:
+            value = getattr(value, "py_func", value)
+            if isinstance(value, FunctionType) and value is not function:
+                found += _origins(value)
+            elif hasattr(value, "_fields"):
+                found.append((inspect.getfile(value), frozenset({value.__name__})))
+    return found
+
+
+def _stamp(function: FunctionType) -> str:
     """A fingerprint of all files that a function is made of.
 
     They are its own and those of the functions, constants and types that it names,
     and so on. numba's own stamp is of the first alone: it would go on using what was
     inlined from a file that has changed since. Imports are absolute, as everywhere.
     """
-    code = function.__code__
-    new = [(code.co_filename, _words(code) | {function.__name__})]
+    new = _origins(function)
     seen, sources = set(new), {}
     for file, words in new:
         if file not in sources:

@@ -139,6 +139,10 @@ PACKAGES = {
         exec(compile("def made(x):\\n return RATE + x", __file__, "exec"))
         like_by_exec = compiled(made)
 
+        scope = {"step": fourfold, "__name__": __name__}
+        exec(compile("def given(x):\\n return step(x)", __file__, "exec"), scope)
+        given = compiled(scope["given"])
+
         @compiled
         def alone(x, more=0.5):
             return x + more
@@ -146,7 +150,7 @@ PACKAGES = {
         if __name__ == "__main__":
             for name in (
                 "by_name by_module by_constant by_derived_constant two_files_away "
-                "by_exec like_by_exec alone"
+                "by_exec like_by_exec given alone"
             ).split():
                 f = globals()[name]
                 print(name, f(1.0), len(f.stats.cache_hits))
@@ -163,6 +167,7 @@ RESULTS = {
     "two_files_away": 7.0,
     "by_exec": 11.0,
     "like_by_exec": 101.0,
+    "given": 4.0,
     "alone": 1.5,
     "by_type": 5.0,
 }
@@ -171,7 +176,7 @@ EDITS = [
     (
         "ground/vectors.py",
         ("2.0 * x", "3.0 * x"),
-        {"by_name": 4.0, "by_module": 5.0, "two_files_away": 12.0},
+        {"by_name": 4.0, "by_module": 5.0, "two_files_away": 12.0, "given": 9.0},
     ),
     (
         "ground/sizes.py",
@@ -195,7 +200,11 @@ EDITS = [
             "by_type": 3.0,
         },
     ),
-    ("world/kernels.py", ("OTHER = 7.0", "OTHER = 8.0"), {"two_files_away": 12.0}),
+    (
+        "world/kernels.py",
+        ("OTHER = 7.0", "OTHER = 8.0"),
+        {"two_files_away": 12.0, "given": 9.0},
+    ),
 ]
 
 
