@@ -88,6 +88,10 @@ class Permission(NamedTuple):
     code: Annotated[float, Field("1", "why it stands: a `Stop`", 0.0)]
 
 
+FREE = Permission(1.0, 0.0)
+"""What the passive wrist permits where there is none."""
+
+
 class Point(NamedTuple):
     """A point."""
 
@@ -147,6 +151,7 @@ finite_estimate = finiteness(Estimate)
 finite_guide = finiteness(Guide)
 finite_tool = finiteness(RobotTool)
 finite_cone = finiteness(ViewCone)
+finite_permission = finiteness(Permission)
 
 
 @compiled
