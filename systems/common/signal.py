@@ -172,6 +172,14 @@ def reader(signal: Any) -> Any:
     return generated(source, name, signal, {signal.__name__: signal})
 
 
+def writer(signal: Any) -> Any:
+    """A compiled function that writes the signal into an array of its elements."""
+    name = f"write_{signal.__name__}"
+    parts = enumerate(elements(signal, "value"))
+    body = "".join(f"    values[{i}] = {part}\n" for i, part in parts)
+    return generated(f"def {name}(values, value):\n{body}", name, signal, {})
+
+
 def finiteness(signal: Any) -> Any:
     """A compiled function that says whether all elements of a signal are finite."""
     name = f"finite_{signal.__name__}"

@@ -116,10 +116,8 @@ class StepBlock(Block):
         )
         self.DeclareDiscreteState(_array(state))
         shared = self.cached("step", run, tickets | {self.xd_ticket()})
-        first = last = length(kind)
-        for name, signal in outputs.items():
-            self._emit(shared, name, signal, first)
-            first += length(signal)
+        last = length(kind)
+        self._emit(shared, outputs, last)
         self.update_every(period, lambda context: shared.Eval(context)[:last])
 
     def declare_update(
@@ -159,6 +157,25 @@ class StepBlock(Block):
             run if len(kinds) == 1 else lambda context: np.split(run(context), ends),
         )
 
+    def declare_map(
+        self,
+        function: Callable[..., Any],
+        constants: Sequence[np.ndarray],
+        inputs: Mapping[str, Any],
+        outputs: Mapping[str, Any],
+    ) -> None:
+        """Declares ports whose outputs are a map of the inputs: no state, no time.
+
+        Args:
+            function: Returns the outputs; see `wired`.
+            constants: Records of constants, as `packed` makes them.
+            inputs: Ports and their signals.
+            outputs: Ports and their signals.
+        """
+        gives = list(outputs.values())
+        run, tickets = self._runner(function, constants, [], inputs, gives, False, {})
+        self._emit(self.cached("map", run, tickets), outputs, 0)
+
     def _runner(
         self,
         step: Callable[..., Any],
@@ -195,14 +212,17 @@ class StepBlock(Block):
         tickets = {port.ticket() for port in ports.values()}
         return of_context, tickets | ({self.time_ticket()} if timed else set())
 
-    def _emit(self, shared: Any, name: str, signal: Any, first: int) -> None:
-        last = first + length(signal)
-        self.signal_out(
-            name,
-            signal,
-            lambda context: shared.Eval(context)[first:last],
-            {shared.ticket()},
-        )
+    def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
+        """Declares outputs that are the shared array's parts from `first` on."""
+        for name, signal in outputs.items():
+            part = slice(first, first + length(signal))
+            self.signal_out(
+                name,
+                signal,
+                lambda context, part=part: shared.Eval(context)[part],
+                {shared.ticket()},
+            )
+            first = part.stop
 
 
 def _kind(state: Any) -> Any:
