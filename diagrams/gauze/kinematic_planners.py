@@ -150,7 +150,6 @@ class Bypass(LocalPlanner):
         super().__post_init__()
         self._bypass = tool_bypass.constants(self.bypass)[0]
         self.edge, self.waits, self.edge_switches = 0, 0, 0
-        self.aim: Vector = (0.0, 0.0, 0.0)
 
     def _go_to_target(
         self,
@@ -162,7 +161,7 @@ class Bypass(LocalPlanner):
     ) -> tuple[Vector, tuple[float, ...]]:
         g, p, goal = xyz(robot_tool, 0), xyz(robot_tool, 3), xyz(target, 0)
         edge = self.edge
-        v_tip, self.edge, self.waits, self.aim = tool_bypass.bypass(
+        v_tip, self.edge, self.waits, _ = tool_bypass.bypass(
             self._bypass,
             ROOM,
             NO_CONE,
@@ -190,23 +189,18 @@ class Constrained:
         inner: The planner.
         params: Of the constraint.
         holds: Whether the evasion condition held at all instants so far.
-        near: Instants with a tool near.
-        held: Those of them at which the condition held.
         seconds: Wall time of every step, s.
     """
 
     inner: Planner
     params: ClearanceConstraintParams = field(default_factory=lambda: CLEARANCE)
     holds: bool = True
-    near: int = 0
-    held: int = 0
     seconds: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Starts with nothing to dodge."""
         self._record = clearance_constraint.constants(self.params)[0]
         self._dodging = np.zeros(clearance_constraint.TOOLS)
-        self.status = np.zeros(6)
 
     def step(
         self,
@@ -221,7 +215,7 @@ class Constrained:
         wanted = self.inner.step(dt, robot_tool, obstacle, target, others)
         g, p = xyz(robot_tool, 0), xyz(robot_tool, 3)
         v: Vector
-        v, self._dodging, self.status = clearance_constraint.constrain(
+        v, self._dodging, status = clearance_constraint.constrain(
             self._record,
             ROOM,
             NO_CONE,
@@ -232,10 +226,8 @@ class Constrained:
             self._dodging,
         )
         self.seconds.append(time.perf_counter() - start)
-        if self.status[1]:
-            self.near += 1
-            self.held += int(self.status[2])
-            self.holds = self.holds and self.status[2] > 0.5
+        if status[1]:
+            self.holds = self.holds and status[2] > 0.5
         return v
 
 
