@@ -1,7 +1,6 @@
 """Running a scenario: build, advance, log; then measure, plot and replay."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 import gc
 import json
@@ -24,7 +23,7 @@ from diagrams.common import metrics, replay
 from diagrams.common.plots import save_figure
 from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
 from diagrams.common.study import Study, build, get_study
-from systems.common.compiled import announced
+from systems.common.compiled import rehearse
 from systems.common.stopwatch import STOPWATCH
 
 Progress = Callable[[float, float], None]
@@ -74,24 +73,11 @@ def columns(study: Study, port: str) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
-def rehearse(
-    diagram: Any, context: Any, config: SimulatorConfig, duration: float
-) -> None:
-    """Runs the first instants on a copy of the context, and forgets them.
-
-    The blocks' kernels are compiled at their first call, or loaded from the disk: that
-    is no part of the time that a run takes. An error will come again in the run.
-
-    Args:
-        diagram: The root diagram.
-        context: At the start of the run.
-        config: The run's integrator.
-        duration: How far to go, in s.
-    """
-    simulator = Simulator(diagram, context.Clone())
+def start(diagram: Any, config: SimulatorConfig, context: Any = None) -> Simulator:
+    """A simulator of a diagram at the start of a run, with the run's integrator."""
+    simulator = Simulator(diagram, context)
     ApplySimulatorConfig(config, simulator)
-    with announced(), suppress(Exception, SystemExit):
-        simulator.AdvanceTo(duration)
+    return simulator
 
 
 def simulate(
@@ -141,13 +127,13 @@ def simulate_diagram(
     speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
-    simulator = Simulator(root)
     config = study.integrator(scenario)
-    ApplySimulatorConfig(config, simulator)
+    simulator = start(root, config)
     context = simulator.get_mutable_context()
     root.SetRandomContext(context, RandomGenerator(scenario.seed))
     run = Run(scenario, study, root, duration=duration, replay_speed=speed)
-    rehearse(root, context, config, 1.5 * study.log_period)
+    first = start(root, config, context.Clone())
+    rehearse(lambda: first.AdvanceTo(1.5 * study.log_period))
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:

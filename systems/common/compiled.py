@@ -12,7 +12,7 @@ its first call for the types it gets and cached on disk.
 
 import ast
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 import hashlib
 from importlib.util import find_spec
@@ -88,6 +88,16 @@ def announced() -> AbstractContextManager[Any]:
 
 _FOREIGN = sys.stdlib_module_names | {"numba", "numpy"}
 """Packages that are not looked into."""
+
+
+def rehearse(act: Callable[[], Any]) -> None:
+    """Acts once and forgets it, before a clock runs.
+
+    Kernels are compiled at their first call, or loaded from the disk: that is no part
+    of the time that the act takes. An error will come again in the act itself.
+    """
+    with announced(), suppress(Exception, SystemExit):
+        act()
 
 
 @cache

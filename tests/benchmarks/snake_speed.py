@@ -327,7 +327,3 @@ def report(seed: int = 1, scenes: int = 0) -> str:
     if importlib.util.find_spec("mujoco") is None:
         lines += ["", "MuJoCo is not installed: pip install 'trocar[peers]'"]
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(report())
