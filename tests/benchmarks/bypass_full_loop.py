@@ -15,7 +15,7 @@ import tempfile
 import numpy as np
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from plants.surgeon.recording import save_recording
 from tests.benchmarks.crossed_scenes import Scene, scene
 

@@ -6,15 +6,15 @@ import time
 
 import numpy as np
 
+from systems.auto_guidance.backward_movement import BackwardMovementParams
+from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
+from systems.auto_guidance.go_to_target import GoToTargetParams, guide_point
 from systems.bypass import (
     clearance_constraint,
     obstacle_tools,
     tool_bypass,
     workspace,
 )
-from systems.auto_guidance.backward_movement import BackwardMovementParams
-from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
-from systems.auto_guidance.go_to_target import GoToTargetParams, guide_point
 from systems.bypass.bypass_route import up_and_over
 from systems.bypass.clearance_constraint import ClearanceConstraintParams
 from systems.bypass.obstacle_tools import Margins

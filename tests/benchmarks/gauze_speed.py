@@ -22,10 +22,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.common.run import Run, build, rehearse, simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.common.run import Run, rehearse, simulate
 from diagrams.common.study import cenic
 from diagrams.gauze.theatre import add_theatre
+from diagrams.studies import build, load_scenario
 from systems.common.stopwatch import STOPWATCH
 
 

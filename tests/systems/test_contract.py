@@ -10,8 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem, PortDataType
 import pytest
 
-from diagrams.common.scenario import load_scenario
-from diagrams.common.study import get_study
+from diagrams.studies import build, load_scenario
 import plants
 import systems
 from systems.common.block import Block
@@ -97,7 +96,7 @@ def test_ports_are_named_and_documented(kind):
 @pytest.mark.parametrize("name", DIAGRAMS)
 def test_observers_in_their_diagram(name):
     scenario = load_scenario(name)
-    diagram = get_study(scenario.system).make_diagram(scenario)
+    diagram = build(scenario)
     context = diagram.CreateDefaultContext()
     for system in diagram.GetSystems():
         if type(system) in OBSERVERS:
@@ -110,7 +109,7 @@ def test_every_observer_is_in_a_diagram():
     seen = set()
     for name in DIAGRAMS:
         scenario = load_scenario(name)
-        diagram = get_study(scenario.system).make_diagram(scenario)
+        diagram = build(scenario)
         seen |= {type(system) for system in diagram.GetSystems()}
     assert set(OBSERVERS) <= seen
 

@@ -11,8 +11,9 @@ import pytest
 
 from diagrams.common.replay import start_meshcat
 from diagrams.common.run import Run, run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.metrics import spans, stops, time_to_target
+from diagrams.studies import load_scenario
 from plants.surgeon.recording import save_recording
 
 KEYS = {

@@ -11,8 +11,9 @@ import pytest
 
 from diagrams.common.cli import main
 from diagrams.common.run import run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.resection.scenario import plan_operation
+from diagrams.studies import load_scenario
 from plants.tissue.execution import Execution, load_execution, save_execution
 from systems.common.archive import beside
 from systems.resection.planning.reach import load_reach

@@ -9,7 +9,8 @@ import pytest
 
 from diagrams.bedside.wrist_metrics import last_above, settled
 from diagrams.common.run import Run, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import load_scenario
 
 
 @functools.cache

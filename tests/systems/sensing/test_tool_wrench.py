@@ -7,7 +7,7 @@ from pydrake.multibody.math import SpatialForce
 import pytest
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from diagrams.wrist.diagram import make_wrist_diagram
 from systems.sensing import sensor_noise
 from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
