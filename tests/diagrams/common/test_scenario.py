@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from diagrams.common.scenario import (
-    Scenario,
     ScenarioError,
     find_scenario,
     save_scenario,
     scenario_files,
 )
 from diagrams.studies import load_scenario
+
 
 def test_names_and_files():
     assert find_scenario("gauze_static").is_file()

@@ -104,7 +104,9 @@ def test_a_key_that_stands_twice_is_refused(tmp_path, text):
     path = tmp_path / "twice.yaml"
     path.write_text(text)
     line = text[: text.rindex("d")].count("\n") + 1
-    with pytest.raises(ScenarioError, match=rf"twice.yaml, line {line}: key 'd' stands"):
+    with pytest.raises(
+        ScenarioError, match=rf"twice.yaml, line {line}: key 'd' stands"
+    ):
         read_tree(path)
 
 
@@ -127,7 +129,7 @@ def test_a_byte_order_mark_is_no_text(tmp_path, encoding):
 def test_a_picture_is_no_scenario(tmp_path):
     path = tmp_path / "picture.yaml"
     path.write_bytes(bytes([0xFF, 0xD8, 0xFF, 0xE0]) * 9)
-    with pytest.raises(ScenarioError, match="cannot read .*picture.yaml"):
+    with pytest.raises(ScenarioError, match=r"cannot read .*picture\.yaml"):
         read_tree(path)
 
 

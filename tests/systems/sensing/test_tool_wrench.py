@@ -13,8 +13,11 @@ from systems.sensing import sensor_noise
 from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
 
 QUIET = [
-    f"tool_wrench.{name}=0.0"
-    for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+    "compare=[]",
+    *(
+        f"tool_wrench.{name}=0.0"
+        for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+    ),
 ]
 
 
