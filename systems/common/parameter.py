@@ -95,6 +95,11 @@ def parameter(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
     return field(default=default, metadata=metadata)
 
 
+def part(kind: type) -> Any:
+    """A field of a dataclass that holds parameters of another."""
+    return field(default_factory=kind)
+
+
 def _copy(value: Any) -> Any:
     return [_copy(item) for item in value] if isinstance(value, list) else value
 
