@@ -99,6 +99,12 @@ def _check_room(scenario: NavigationScenario) -> None:
     body = scenario.robot.radius
     safe = body + scenario.switching.margins[-1]
     vision = scenario.perception.vision
+    widest = body + scenario.switching.margins[0]
+    if scenario.planner == "switching" and vision <= widest:
+        raise ScenarioError(
+            f"perception.vision={vision} m: expected > {widest:.6g}, robot.radius and "
+            "the first of switching.margins together"
+        )
     for index, (x, y, radius, _, _) in enumerate(discs(scenario)):
         if radius + body >= vision:
             raise ScenarioError(

@@ -108,7 +108,8 @@ def test_a_faster_obstacle_is_told_and_the_robot_does_its_best():
     [
         (["goal=[4.0, 0.3]"], r"goal=.* lies inside obstacles\[0\]"),
         (["start=[3.4, 0.1]"], r"start=.* inside the safety circle of obstacles\[0\]"),
-        (["perception.vision=0.6"], r"R_i <|must be greater"),
+        (["perception.vision=0.6"], r"exceeds perception.vision=0.6 m.*expected R_i <"),
+        (["perception.vision=0.3"], r"perception.vision=0.3 m: expected > 0.38, robot"),
         (["goal=[.nan, 0.0]"], r"finite"),
         (["goal=[0.0, 0.0]"], r"goal=.*: 0 m from start=.*, expected more than reach"),
         (["goal=[1000.0, 0.0]"], r"goal=.* m: expected 2 numbers .* <= 100"),
