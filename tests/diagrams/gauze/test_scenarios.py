@@ -1,6 +1,5 @@
 """The five gauze scenarios must show what the paper shows, in the full loop."""
 
-import functools
 import json
 from pathlib import Path
 import re
@@ -14,6 +13,7 @@ from diagrams.common.run import Run, run_scenario, simulate
 from diagrams.common.scenario import ScenarioError, load_scenario
 from diagrams.gauze.metrics import spans, stops, time_to_target
 from plants.surgeon.recording import save_recording
+from tests.runs import run
 
 KEYS = {
     *("reached", "time_to_target", "final_tip_error", "min_tool_clearance"),
@@ -23,21 +23,9 @@ KEYS = {
 }
 
 
-@functools.cache
-def run(name: str) -> Run:
-    """One run of each scenario serves all tests."""
-    result = simulate(load_scenario(name))
-    assert not result.error
-    return result
-
-
-@functools.cache
 def paper(name: str) -> Run:
     """A run with the paper's own sum of potentials, nothing behind it."""
-    own = ["behaviour=field", "clearance_constraint.active=false"]
-    result = simulate(load_scenario(name, own))
-    assert not result.error
-    return result
+    return run(name, "behaviour=field", "clearance_constraint.active=false")
 
 
 def tip_speed(r: Run, signal: str) -> np.ndarray:

@@ -17,6 +17,7 @@ from plants.tissue.execution import Execution, load_execution, save_execution
 from systems.common.archive import beside
 from systems.resection.planning.reach import load_reach
 from systems.resection.planning.session import load_session
+from tests import runs
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def test_carving_keeps_up(paper):
 
 
 def test_refused():
-    run = simulate(load_scenario("resect_refused"))
+    run = runs.run("resect_refused")
     m = run.metrics
     assert [refusal["reason"] for refusal in m["refusals"]] == [
         "tool outside",
@@ -80,7 +81,7 @@ def test_auto_resumes_after_being_killed(tmp_path):
 
 
 def test_auto_small():
-    run = simulate(load_scenario("resect_auto_small"))
+    run = runs.run("resect_auto_small")
     m = run.metrics
     assert run.wall_time < 300.0
     assert m["reachable_fraction"] >= 0.80

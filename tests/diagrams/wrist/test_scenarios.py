@@ -1,24 +1,14 @@
 """The wrist's scenarios must show the issue's figures, with the arm in the loop."""
 
 from dataclasses import replace
-import functools
-import json
 
 import numpy as np
 import pytest
 
 from diagrams.bedside.wrist_metrics import last_above, settled
-from diagrams.common.run import Run, simulate
+from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError, load_scenario
-
-
-@functools.cache
-def run(name: str, *overrides: str) -> Run:
-    """One run of each scenario serves all tests."""
-    result = simulate(load_scenario(name, overrides))
-    assert not result.error
-    json.dumps(result.metrics, allow_nan=False)
-    return result
+from tests.runs import run
 
 
 def test_arcs_about_a_wrong_guess():
