@@ -22,7 +22,9 @@ def columns(port: str, kind: Any) -> list[str]:
     return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
 
 
-def named(logged: Mapping[str, Any], samples: Mapping[str, np.ndarray], root: str) -> Any:
+def named(
+    logged: Mapping[str, Any], samples: Mapping[str, np.ndarray], root: str
+) -> Any:
     """What was logged below a name: of "planner" there is `guide.rho`.
 
     Args:
@@ -60,7 +62,9 @@ def add_log(builder: Any, station: Any, names: Iterable[str], period: float) -> 
     return sink
 
 
-def read_log(sink: Any, logged: Mapping[str, Any], context: Any) -> dict[str, np.ndarray]:
+def read_log(
+    sink: Any, logged: Mapping[str, Any], context: Any
+) -> dict[str, np.ndarray]:
     """All columns of the log; "time" is the first."""
     log = sink.FindLog(context)
     names = [name for port, kind in logged.items() for name in columns(port, kind)]

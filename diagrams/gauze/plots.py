@@ -73,9 +73,7 @@ def speeds(run: Any) -> Figure:
     upper.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     gap = run.clearance.obstacle * MM
-    error = np.linalg.norm(
-        run.robot.tool.tip - run.target.shaft.tip, axis=1
-    )
+    error = np.linalg.norm(run.robot.tool.tip - run.target.shaft.tip, axis=1)
     lower.plot(time, gap, color=COLORS["obstacle"], label="clearance to O")
     lower.plot(time, error * MM, color=COLORS["target"], label="tip to S's tip")
     lower.axhline(0.0, color="k", lw=0.6)

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 
-from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.bedside.bedside import ToolAtStart
+from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
@@ -33,7 +33,6 @@ from systems.motion.tool_navigation import (
 )
 from systems.sensing.optical_tracker import OpticalTrackerParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
-
 
 BEHAVIOURS = ("bypass", "field")
 """Attract or bypass, or the paper's sum of potentials (see `go_to_target.form`)."""

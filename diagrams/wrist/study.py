@@ -9,10 +9,10 @@ from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
 from diagrams.wrist.diagram import make_wrist_diagram
 from diagrams.wrist.plots import plots
+from diagrams.wrist.scenario import WristScenario, companions
 from plants.abdomen.wall_force import FulcrumError
 from systems.common.signals import Force, RobotTool
 from systems.motion.joint_commands import Status
-from diagrams.wrist.scenario import WristScenario, companions
 
 SIGNALS = WRIST_SIGNALS | {
     "robot.tool": RobotTool,

@@ -383,7 +383,9 @@ class ClearanceConstraint(StepBlock):
             [
                 constants(params),
                 tools_around.constants(margins or Margins()),
-                limits.constants(reach or ReachLimits(), workspace or WorkspaceParams()),
+                limits.constants(
+                    reach or ReachLimits(), workspace or WorkspaceParams()
+                ),
             ],
             {
                 "v_R": Velocity,

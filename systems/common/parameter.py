@@ -162,11 +162,12 @@ def _refuse(key: str, value: Any, told: Any, expected: str, default: Any) -> Non
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a scenario: its whole name, what it may be, its value."""
+    """A key of a scenario: its whole name, what it may be, its value and default."""
 
     name: str
     parameter: Parameter
     value: Any
+    default: Any
 
 
 def keys(params: Any, owner: str = "") -> Iterator[Key]:
@@ -178,4 +179,5 @@ def keys(params: Any, owner: str = "") -> Iterator[Key]:
         for part, item in parts:
             yield from keys(item, part)
         if "parameter" in declared.metadata and not is_dataclass(value):
-            yield Key(key, declared.metadata["parameter"], None if parts else value)
+            told, default = declared.metadata["parameter"], default_of(declared)
+            yield Key(key, told, None if parts else value, default)

@@ -182,9 +182,7 @@ def limit_tip_velocity(
     lateral = (x, y, 0.0)
     if norm(lateral) > 1e-6:
         # The direction in which the tip tilts further, perpendicular to the shaft.
-        outwards = along(
-            scaled(math.cos(tilt), unit(lateral)), -math.sin(tilt), _DOWN
-        )
+        outwards = along(scaled(math.cos(tilt), unit(lateral)), -math.sin(tilt), _DOWN)
         v = held(params, v, outwards, (params.max_tilt - tilt) * q)
     ray = sub(p_WP, view_cone.apex)
     off = unit(across(unit(ray, _DOWN), view_cone.u), _DOWN)

@@ -1,7 +1,6 @@
 """The five gauze scenarios must show what the paper shows, in the full loop."""
 
 import base64
-import functools
 import json
 from pathlib import Path
 import re
@@ -18,6 +17,8 @@ from diagrams.studies import load_scenario
 from plants.instruments.posed_tools import PosedToolsParams
 from plants.surgeon.recording import save_recording
 from systems.common.geometry import closest_points
+from systems.common.signals import Velocity
+from tests.runs import run
 
 KEYS = {
     *("reached", "time_to_target", "final_tip_error", "min_tool_clearance"),
@@ -27,21 +28,9 @@ KEYS = {
 }
 
 
-@functools.cache
-def run(name: str) -> Run:
-    """One run of each scenario serves all tests."""
-    result = simulate(load_scenario(name))
-    assert not result.error
-    return result
-
-
-@functools.cache
 def paper(name: str) -> Run:
     """A run with the paper's own sum of potentials, nothing behind it."""
-    own = ["behaviour=field", "clearance_constraint.active=false"]
-    result = simulate(load_scenario(name, own))
-    assert not result.error
-    return result
+    return run(name, "behaviour=field", "clearance_constraint.active=false")
 
 
 def tip_speed(r: Run, velocity: Velocity) -> np.ndarray:

@@ -1,6 +1,5 @@
 """The six navigation scenarios must show what the thesis promises, in the full loop."""
 
-import functools
 import json
 
 import numpy as np
@@ -12,10 +11,10 @@ from diagrams.common.scenario import ScenarioError
 from diagrams.navigation.figures import thesis_figures
 from diagrams.navigation.plots import plots
 from diagrams.navigation.scenario import outruns
-from diagrams.navigation.signals import logged
 from diagrams.studies import load_scenario
 from plants.turtlebot.turtlebot import RobotState
 from systems.switching.switching_state import MODES
+from tests.runs import run
 
 NAMES = ("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd")
 KEYS = {
@@ -24,22 +23,14 @@ KEYS = {
 }
 
 
-@functools.cache
-def run(name: str, *overrides: str) -> Run:
-    """One run of each scenario serves all tests."""
-    result = simulate(load_scenario(f"nav_{name}", list(overrides)))
-    assert not result.error
-    return result
-
-
 def modes(r: Run) -> set[str]:
     """The planner's states in a run."""
-    return {MODES[int(m)] for m in np.round(logged(r, "planner.mode").state)}
+    return {MODES[int(m)] for m in np.round(r.planner.mode.state)}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_scenario_arrives_without_collision(name):
-    figures = run(name).metrics
+    figures = run(f"nav_{name}").metrics
     assert set(figures) >= KEYS
     assert figures["reached"] and not figures["collided"]
     assert figures["min_clearance"] > 0.05
@@ -48,22 +39,22 @@ def test_every_scenario_arrives_without_collision(name):
 
 
 def test_the_local_minimum_stops_the_classical_method_alone():
-    classical = run("local_minimum", "planner=classical")
+    classical = run("nav_local_minimum", "planner=classical")
     assert not classical.metrics["reached"] and not classical.metrics["collided"]
-    robot = logged(classical, "robot.state")
+    robot = classical.robot.state
     assert np.abs(robot.v[-40:]).max() < 0.01  # it stands still for ever
     assert abs(robot.x[-1] - 5.0) < 0.05  # in the middle
-    assert run("local_minimum").metrics["reached"]
+    assert run("nav_local_minimum").metrics["reached"]
 
 
 def test_the_trap_is_left_round_its_group():
-    assert {"group", "leave", "attractive"} <= modes(run("u_trap"))
-    assert not run("u_trap", "planner=classical").metrics["reached"]
+    assert {"group", "leave", "attractive"} <= modes(run("nav_u_trap"))
+    assert not run("nav_u_trap", "planner=classical").metrics["reached"]
 
 
 def test_limits_of_the_robot_hold():
-    r = run("u_trap")
-    robot = logged(r, "robot.state")
+    r = run("nav_u_trap")
+    robot = r.robot.state
     v, omega = robot.v, robot.omega
     assert np.abs(v).max() < 0.5 + 1e-6 and np.abs(omega).max() < 1.8 + 1e-6
     period = r.study.log_period
@@ -72,15 +63,15 @@ def test_limits_of_the_robot_hold():
 
 
 def test_the_statechart_passes_one_standing_obstacle():
-    r = run("one_static", "planner=statechart")
+    r = run("nav_one_static", "planner=statechart")
     assert r.metrics["reached"]
-    states = np.round(logged(r, "planner.mode").state).astype(int).tolist()
+    states = np.round(r.planner.mode.state).astype(int).tolist()
     assert list(dict.fromkeys(states)) == [0, 1, 2] and states[-1] == 0
 
 
 def test_noise_is_repeatable_and_survived():
     noise = ("perception.position_noise=0.02", "perception.velocity_noise=0.05")
-    first = run("three_moving", *noise)
+    first = run("nav_three_moving", *noise)
     again = simulate(load_scenario("nav_three_moving", list(noise)))
     assert first.metrics["reached"]
     for name, column in first.signals.items():
@@ -89,7 +80,7 @@ def test_noise_is_repeatable_and_survived():
 
 def test_the_gap_is_passed_with_noise():
     noise = ("perception.position_noise=0.01", "perception.velocity_noise=0.05")
-    r = run("local_minimum", *noise)
+    r = run("nav_local_minimum", *noise)
     assert r.metrics["reached"] and not r.metrics["collided"]
 
 
@@ -142,7 +133,7 @@ def test_a_world_without_obstacles_has_no_clearance():
     r = run("one_static", "obstacles=[]", "compare=[]")
     assert r.metrics["reached"] and r.metrics["min_clearance"] is None
     assert r.metrics["path_ratio"] == pytest.approx(1.0, abs=0.02)
-    assert not logged(r, "obstacles.rows").radius.any()
+    assert not r.obstacles.rows.radius.any()
     for figure in plots(r).values():
         png(figure)
 
@@ -151,14 +142,14 @@ def test_signals_have_the_names_of_their_declarations():
     r = run("one_static")
     assert list(r.signals)[1:6] == [f"robot.state.{n}" for n in RobotState._fields]
     assert list(r.signals)[6] == "obstacles.rows.x_0"
-    obstacles, robot = logged(r, "obstacles.rows"), logged(r, "robot.state")
+    obstacles, robot = r.obstacles.rows, r.robot.state
     assert obstacles.x.shape == (*robot.x.shape, 24)
     np.testing.assert_array_equal(obstacles.radius[:, 0], 0.5)
     np.testing.assert_array_equal(robot.theta, r.signals["robot.state.theta"])
 
 
 def test_plots_of_two_methods_and_of_the_thesis():
-    figures = plots(run("local_minimum"))
+    figures = plots(run("nav_local_minimum"))
     assert {"path", "motion", "potential", "figure_04", "figure_12"} <= set(figures)
     labels = [text.get_text() for text in figures["path"].legends[0].get_texts()]
     assert labels[0].startswith("switching: arrives")

@@ -1,27 +1,17 @@
 """The wrist's scenarios must show the issue's figures, with the arm in the loop."""
 
 from dataclasses import replace
-import functools
-import json
 
 import numpy as np
 import pytest
 
 from diagrams.bedside.wrist_metrics import last_above, settled
 from diagrams.common.case import Case
-from diagrams.common.run import Run, prepare, simulate
+from diagrams.common.run import prepare, simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.studies import load_scenario
 from diagrams.wrist.plots import plots
-
-
-@functools.cache
-def run(name: str, *overrides: str) -> Run:
-    """One run of each scenario serves all tests; nothing is run beside it."""
-    result = simulate(Case(load_scenario(name, overrides)))
-    assert not result.error
-    json.dumps(result.metrics, allow_nan=False)
-    return result
+from tests.runs import run
 
 
 def test_arcs_about_a_wrong_guess():
