@@ -5,12 +5,11 @@ from typing import Any
 import numpy as np
 
 from diagrams.navigation.scenario import outruns
-from diagrams.navigation.signals import logged
 
 
 def gaps(run: Any) -> np.ndarray:
     """Distance between surfaces, (samples, obstacles) [m]; infinite for none."""
-    robot, obstacles = logged(run, "robot.state"), logged(run, "obstacles.rows")
+    robot, obstacles = run.robot.state, run.obstacles.rows
     distance = np.hypot(obstacles.x - robot.x[:, None], obstacles.y - robot.y[:, None])
     gap = distance - obstacles.radius - run.scenario.robot.radius
     return np.where(obstacles.radius > 0.0, gap, np.inf)
@@ -18,7 +17,7 @@ def gaps(run: Any) -> np.ndarray:
 
 def goal_distance(run: Any) -> np.ndarray:
     """Distance from the goal (samples,) [m]."""
-    robot = logged(run, "robot.state")
+    robot = run.robot.state
     x, y = run.scenario.goal
     return np.hypot(robot.x - x, robot.y - y)
 
@@ -29,13 +28,13 @@ def measure(run: Any) -> dict[str, Any]:
     Clearance and path count until the goal is reached.
     """
     time = run.signals["time"]
-    robot = logged(run, "robot.state")
+    robot = run.robot.state
     near = np.flatnonzero(goal_distance(run) <= run.scenario.reach)
     last = int(near[0]) if near.size else len(time) - 1
     clearance = float(gaps(run)[: last + 1].min())
     steps = np.hypot(np.diff(robot.x[: last + 1]), np.diff(robot.y[: last + 1]))
     straight = float(goal_distance(run)[0])
-    mode = logged(run, "planner.mode")
+    mode = run.planner.mode
     switches = np.diff(np.round(mode.state[: last + 1]))
     outrun = np.round(mode.outrun[: last + 1])
     collided = clearance <= 0.0

@@ -11,7 +11,6 @@ from diagrams.common.plots import COLORS, add_axes, new_figure
 from diagrams.navigation.figures import thesis_figures, total_potential
 from diagrams.navigation.metrics import gaps, goal_distance
 from diagrams.navigation.scenario import discs
-from diagrams.navigation.signals import logged
 from systems.switching.signals import Seen
 from systems.switching.statechart_planner import STATES
 from systems.switching.switching_state import MODES
@@ -33,7 +32,7 @@ def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
 
     Time ends a little after the goal is reached.
     """
-    obstacles = logged(run, "obstacles.rows")
+    obstacles = run.obstacles.rows
     arrival = run.metrics["time_to_target"]
     time = run.signals["time"]
     shown = time <= (time[-1] if arrival is None else arrival + 1.0)
@@ -71,7 +70,7 @@ def outcome(run: Any) -> str:
 def draw_ways(axes: Any, runs: dict[str, Any]) -> None:
     """Draws the planners' ways, each until its run was decided."""
     for name, run in runs.items():
-        robot = logged(run, "robot.state")
+        robot = run.robot.state
         hit = np.flatnonzero(gaps(run).min(axis=1) <= 0.0)
         last = hit[0] if hit.size else len(robot.x) - 1
         label = f"{name}: {outcome(run)}"
@@ -90,7 +89,7 @@ def path(run: Any, runs: dict[str, Any]) -> Figure:
     axes = add_axes(figure, 1, 1, 1)
     draw_world(axes, run)
     draw_ways(axes, runs)
-    robot = logged(run, "robot.state")
+    robot = run.robot.state
     radius = run.scenario.robot.radius
     for share in np.linspace(0.0, 1.0, 6):
         k = int(share * (len(robot.x) - 1))
@@ -107,7 +106,7 @@ def motion(run: Any) -> Figure:
     """Clearance, distance to the goal, speed and state over time."""
     figure = new_figure(7.5, 6.5)
     time = run.signals["time"]
-    robot = logged(run, "robot.state")
+    robot = run.robot.state
     upper = add_axes(figure, 3, 1, 1)
     gap = gaps(run).min(axis=1)
     upper.plot(time, gap, color=COLORS["obstacle"], label="nearest obstacle")
@@ -121,7 +120,7 @@ def motion(run: Any) -> Figure:
     middle.legend(loc="upper right")
     lower = add_axes(figure, 3, 1, 3, sharex=upper)
     names = state_names(run.scenario.planner)
-    mode = np.round(logged(run, "planner.mode").state)
+    mode = np.round(run.planner.mode.state)
     lower.step(time, mode, where="post", color=COLORS["robot"])
     lower.set(xlabel="time [s]", yticks=range(len(names)), yticklabels=names)
     lower.set_ylim(-0.5, len(names) - 0.5)

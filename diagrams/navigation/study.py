@@ -13,8 +13,17 @@ from diagrams.navigation.diagram import floor, make_navigation_diagram
 from diagrams.navigation.metrics import measure
 from diagrams.navigation.plots import plots, state_names
 from diagrams.navigation.scenario import NavigationScenario, check, companions
-from diagrams.navigation.signals import SIGNALS, logged
-from systems.common.signal import columns
+from plants.crowd.signals import OBSTACLES
+from plants.turtlebot.turtlebot import Command, RobotState
+from systems.switching.signals import Mode, PlanarVelocity
+
+SIGNALS = {
+    "robot.state": RobotState,
+    "obstacles.rows": OBSTACLES,
+    "planner.v_R": PlanarVelocity,
+    "planner.mode": Mode,
+    "control.command": Command,
+}
 
 LAMPS = (
     (0.20, 0.66, 0.36, 1.0),  # attractive
@@ -47,10 +56,10 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The robot's trail, and a lamp above it in the colour of the state."""
     light(meshcat, floor(run.scenario))
     time = run.signals["time"]
-    robot = logged(run, "robot.state")
+    robot = run.robot.state
     trail = np.column_stack([robot.x, robot.y, np.full(len(time), 0.02)])
     draw_trail(meshcat, animation, "trail", time, trail, (0.12, 0.37, 0.85, 1.0), 80)
-    mode = np.round(logged(run, "planner.mode").state).astype(int)
+    mode = np.round(run.planner.mode.state).astype(int)
     for number, name in enumerate(state_names(run.scenario.planner)):
         lamp = f"lamp/{name.replace(' ', '_')}"
         meshcat.SetObject(lamp, Sphere(0.075), Rgba(*LAMPS[number]))
@@ -69,7 +78,7 @@ STUDY = Study(
     make_diagram=lambda case: make_navigation_diagram(case.scenario),
     check=check,
     measure=measure,
-    signals={name: columns(signal) for name, signal in SIGNALS.items()},
+    signals=lambda scenario: SIGNALS,
     log_period=0.05,
     plots=plots,
     decorate=decorate,

@@ -12,7 +12,6 @@ from diagrams.common.scenario import ScenarioError
 from diagrams.navigation.figures import thesis_figures
 from diagrams.navigation.plots import plots
 from diagrams.navigation.scenario import outruns
-from diagrams.navigation.signals import logged
 from diagrams.studies import load_scenario
 from plants.turtlebot.turtlebot import RobotState
 from systems.switching.switching_state import MODES
@@ -34,7 +33,7 @@ def run(name: str, *overrides: str) -> Run:
 
 def modes(r: Run) -> set[str]:
     """The planner's states in a run."""
-    return {MODES[int(m)] for m in np.round(logged(r, "planner.mode").state)}
+    return {MODES[int(m)] for m in np.round(r.planner.mode.state)}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -50,7 +49,7 @@ def test_every_scenario_arrives_without_collision(name):
 def test_the_local_minimum_stops_the_classical_method_alone():
     classical = run("local_minimum", "planner=classical")
     assert not classical.metrics["reached"] and not classical.metrics["collided"]
-    robot = logged(classical, "robot.state")
+    robot = classical.robot.state
     assert np.abs(robot.v[-40:]).max() < 0.01  # it stands still for ever
     assert abs(robot.x[-1] - 5.0) < 0.05  # in the middle
     assert run("local_minimum").metrics["reached"]
@@ -63,7 +62,7 @@ def test_the_trap_is_left_round_its_group():
 
 def test_limits_of_the_robot_hold():
     r = run("u_trap")
-    robot = logged(r, "robot.state")
+    robot = r.robot.state
     v, omega = robot.v, robot.omega
     assert np.abs(v).max() < 0.5 + 1e-6 and np.abs(omega).max() < 1.8 + 1e-6
     period = r.study.log_period
@@ -74,7 +73,7 @@ def test_limits_of_the_robot_hold():
 def test_the_statechart_passes_one_standing_obstacle():
     r = run("one_static", "planner=statechart")
     assert r.metrics["reached"]
-    states = np.round(logged(r, "planner.mode").state).astype(int).tolist()
+    states = np.round(r.planner.mode.state).astype(int).tolist()
     assert list(dict.fromkeys(states)) == [0, 1, 2] and states[-1] == 0
 
 
@@ -142,7 +141,7 @@ def test_a_world_without_obstacles_has_no_clearance():
     r = run("one_static", "obstacles=[]", "compare=[]")
     assert r.metrics["reached"] and r.metrics["min_clearance"] is None
     assert r.metrics["path_ratio"] == pytest.approx(1.0, abs=0.02)
-    assert not logged(r, "obstacles.rows").radius.any()
+    assert not r.obstacles.rows.radius.any()
     for figure in plots(r).values():
         png(figure)
 
@@ -151,7 +150,7 @@ def test_signals_have_the_names_of_their_declarations():
     r = run("one_static")
     assert list(r.signals)[1:6] == [f"robot.state.{n}" for n in RobotState._fields]
     assert list(r.signals)[6] == "obstacles.rows.x_0"
-    obstacles, robot = logged(r, "obstacles.rows"), logged(r, "robot.state")
+    obstacles, robot = r.obstacles.rows, r.robot.state
     assert obstacles.x.shape == (*robot.x.shape, 24)
     np.testing.assert_array_equal(obstacles.radius[:, 0], 0.5)
     np.testing.assert_array_equal(robot.theta, r.signals["robot.state.theta"])
