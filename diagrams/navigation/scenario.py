@@ -8,8 +8,7 @@ from plants.crowd.crowd_motion import CrowdParams, starts
 from plants.crowd.obstacle_motion import FAR, ObstacleParams, obstacle_at
 from plants.crowd.signals import Obstacle
 from plants.turtlebot.turtlebot import TurtlebotParams
-from systems.common.parameter import check as check_parameters
-from systems.common.parameter import parameter
+from systems.common.parameter import parameter, part
 from systems.switching.classical_planner import ClassicalParams
 from systems.switching.perception import PerceptionParams
 from systems.switching.statechart_planner import StatechartParams
@@ -46,16 +45,14 @@ class NavigationScenario(Scenario):
     obstacles: list[ObstacleParams] = parameter(
         [], "discs and how they move", shape=(-1,)
     )
-    crowd: CrowdParams = parameter(
-        CrowdParams, "people who cross a circle, instead of obstacles"
-    )
+    crowd: CrowdParams = part(CrowdParams)
     thesis_figures: bool = parameter(False, "whether a run draws the thesis's figures")
-    robot: TurtlebotParams = parameter(TurtlebotParams, "the body")
-    perception: PerceptionParams = parameter(PerceptionParams, "what it sees")
-    switching: SwitchingParams = parameter(SwitchingParams, "one field at a time")
-    statechart: StatechartParams = parameter(StatechartParams, "the thesis's method")
-    classical: ClassicalParams = parameter(ClassicalParams, "the sum of fields")
-    control: UnicycleControlParams = parameter(UnicycleControlParams, "the control law")
+    robot: TurtlebotParams = part(TurtlebotParams)
+    perception: PerceptionParams = part(PerceptionParams)
+    switching: SwitchingParams = part(SwitchingParams)
+    statechart: StatechartParams = part(StatechartParams)
+    classical: ClassicalParams = part(ClassicalParams)
+    control: UnicycleControlParams = part(UnicycleControlParams)
 
 
 def heading(scenario: NavigationScenario) -> float:
@@ -82,7 +79,6 @@ def companions(scenario: NavigationScenario) -> dict[str, NavigationScenario]:
 
 def check(scenario: NavigationScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    check_parameters(scenario, "")
     if scenario.crowd.people and scenario.obstacles:
         raise ScenarioError("obstacles and crowd.people: expected one of them")
     way = dist(scenario.start, scenario.goal)
