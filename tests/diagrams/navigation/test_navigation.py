@@ -139,7 +139,7 @@ def test_a_world_without_obstacles_has_no_clearance():
 
 
 def test_signals_have_the_names_of_their_declarations():
-    r = run("one_static")
+    r = run("nav_one_static")
     assert list(r.signals)[1:6] == [f"robot.state.{n}" for n in RobotState._fields]
     assert list(r.signals)[6] == "obstacles.rows.x_0"
     obstacles, robot = r.obstacles.rows, r.robot.state
