@@ -205,9 +205,7 @@ def decision_labels(
 ) -> np.ndarray:
     """Table I: degrees of DECISIONS for two velocities on the axes x, y, m/s."""
     slow = params.moving_speed
-    return activations(
-        params.table_i, 4, quadrants(*v_o, slow), quadrants(*v_r, slow)
-    )
+    return activations(params.table_i, 4, quadrants(*v_o, slow), quadrants(*v_r, slow))
 
 
 @compiled

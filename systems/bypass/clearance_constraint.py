@@ -350,8 +350,8 @@ class ClearanceConstraint(StepBlock):
     Port ``target`` accepts the `Estimate` of the target tool S.
     Port ``camera`` accepts the `Estimate` of the endoscope.
     Port ``view_cone`` accepts the `ViewCone`.
-    Port ``permission`` accepts the passive wrist's `Permission`; full speed if it is not
-    connected. Evasion is not slowed.
+    Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
+    Evasion is not slowed.
     Port ``v_safe`` emits the `Velocity` of the guide point.
     Port ``status`` emits the `ClearanceStatus`.
 
@@ -383,7 +383,7 @@ class ClearanceConstraint(StepBlock):
             [
                 constants(params),
                 tools_around.constants(margins or Margins()),
-                limits.constants(reach or ReachLimits(), workspace or WorkspaceParams()),
+                limits.constants(reach, workspace),
             ],
             {
                 "v_R": Velocity,

@@ -36,7 +36,11 @@ class Margins:
     """
 
     safe_distance: float = parameter(
-        0.007, "D_safe, that the clearance constraint holds", "m", least=0.005, most=0.03
+        0.007,
+        "D_safe, that is held",
+        "m",
+        least=0.005,
+        most=0.03,
     )
     plan_distance: float = parameter(
         0.0095, "D, that ways are planned with", "m", least=0.005, most=0.05
@@ -54,7 +58,11 @@ class Margins:
     avoid_target: bool = parameter(True, "whether S's shaft is an obstacle")
     avoid_camera: bool = parameter(True, "whether the endoscope is one")
     sigmas: float = parameter(
-        3.0, "standard deviations of an estimate that are added", "1", least=0.0, most=10.0
+        3.0,
+        "of an estimate's standard deviations that are added",
+        "1",
+        least=0.0,
+        most=10.0,
     )
     latency: float = parameter(
         0.03,

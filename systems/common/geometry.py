@@ -162,9 +162,7 @@ class ClosestPoints(NamedTuple):
 
 
 @compiled
-def closest_points(
-    a0: Numbers, a1: Numbers, b0: Numbers, b1: Numbers
-) -> ClosestPoints:
+def closest_points(a0: Numbers, a1: Numbers, b0: Numbers, b1: Numbers) -> ClosestPoints:
     """The closest points of the segments a0->a1 and b0->b1.
 
     Crossing segments give distance 0. Where the closest pair is not unique
