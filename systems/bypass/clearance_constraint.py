@@ -56,9 +56,9 @@ from systems.common.projection import greatest_rate, nearest_velocity
 from systems.common.reach_limits import ReachLimits
 from systems.common.signal import Field, Vector
 from systems.common.signals import (
+    FREE,
     Estimate,
     Guide,
-    FREE,
     Permission,
     RobotTool,
     Velocity,

@@ -15,8 +15,8 @@ from systems.switching.statechart_planner import (
 )
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import SwitchingParams, SwitchingState
-from tests.benchmarks.harness import Command, Planner, Seen, Step
-from tests.benchmarks.scenes import Scene
+from tests.benchmarks.navigation_loop import Command, Planner, Seen, Step
+from tests.benchmarks.navigation_scenes import Scene
 
 MARGIN = 0.1
 """Distance [m] that the peers keep from obstacles' surfaces."""

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from diagrams.common.run import Run, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import load_scenario
 
 NAMES = ("crossed", "sweep", "blocked", "hunted", "crowded")
 KEYS = {"edge_switches", "evasion_condition_held", "waiting_time", "time_ratio"}

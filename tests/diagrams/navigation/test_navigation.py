@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from diagrams.common.run import Run, run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.navigation.figures import thesis_figures
 from diagrams.navigation.plots import plots
 from diagrams.navigation.scenario import outruns
+from diagrams.studies import load_scenario
 from systems.switching.switching_state import MODES
 
 NAMES = ("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd")

@@ -13,13 +13,16 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 import pytest
 
+from diagrams.gauze.kinematic_loop import Robot, estimate
+from diagrams.gauze.kinematic_planners import LocalPlanner
+from diagrams.gauze.scenes import CONTACT
 from plants.surgeon.surgeon_tool import SurgeonToolParams, tip_motion
-from systems.auto_guidance.go_to_target import GoToTargetParams
+from systems.auto_guidance.backward_movement import BackwardMovement
+from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
+from systems.auto_guidance.go_to_target import GoToTarget, GoToTargetParams
+from systems.auto_guidance.velocity_corrections import VelocityCorrections
 from systems.common import geometry
 from systems.common.geometry import norm
-from tests.benchmarks.crossed_scenes import CONTACT
-from tests.benchmarks.kinematic_loop import LocalPlanner, Robot, estimate
-from tests.benchmarks.planner_step import add_planner
 from tests.loosely import loosely
 
 closest_points = loosely(geometry.closest_points)
@@ -166,6 +169,20 @@ class Replay(LeafSystem):
         self.DeclareVectorOutputPort(
             "y", size, lambda c, y: y.SetFromVector(signal(c.get_time()))
         )
+
+
+def add_planner(builder, ports):
+    """Adds the four blocks and connects them by name; all output ports by name."""
+    kinds = (GoToTarget, VelocityCorrections, BackwardMovement, FuzzyArbiter)
+    blocks = [builder.AddNamedSystem(kind.__name__, kind()) for kind in kinds]
+    for block in blocks:
+        outputs = map(block.get_output_port, range(block.num_output_ports()))
+        ports |= {port.get_name(): port for port in outputs}
+    for block in blocks:
+        for i in range(block.num_input_ports()):
+            port = block.get_input_port(i)
+            builder.Connect(ports[port.get_name()], port)
+    return ports
 
 
 @pytest.mark.parametrize("kind", ["CROSSING", "PUSHING"])

@@ -6,13 +6,13 @@ from math import hypot
 import numpy as np
 import pytest
 
+from diagrams.gauze.kinematic_planners import NO_CONE
+from diagrams.gauze.scenes import scene
 from systems.bypass.shadow_body import COLUMNS, FULCRUM, TIP, way_distance
 from systems.bypass.tip_edge import tip_edge
 from systems.bypass.top_edge import nearest_room, top_edge
 from systems.bypass.workspace import WorkspaceParams, constants
 from systems.common import geometry
-from tests.benchmarks.bypass_planners import NO_CONE
-from tests.benchmarks.crossed_scenes import scene
 
 ROOM = constants(
     WorkspaceParams(min_insertion=0.015, max_insertion=0.5, max_tilt=3.1, floor=-1.0)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from diagrams.gauze.kinematic_loop import estimate
+from diagrams.gauze.kinematic_planners import NO_CONE
 from systems.bypass import clearance_constraint, obstacle_tools, workspace
 from systems.bypass.clearance_constraint import (
     TOOLS,
@@ -22,8 +24,6 @@ from systems.bypass.shadow_body import (
 )
 from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
-from tests.benchmarks.bypass_planners import NO_CONE
-from tests.benchmarks.kinematic_loop import estimate
 
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from diagrams.gauze.kinematic_planners import NO_CONE, ROOM
+from diagrams.gauze.scenes import CONTACT, scene
 from systems.bypass.bypass_route import OVER, STRAIGHT, choose_way
 from systems.bypass.shadow_body import COLUMNS, FULCRUM, PLAN, SAFE, TIP
 from systems.bypass.tool_bypass import (
@@ -11,10 +13,6 @@ from systems.bypass.tool_bypass import (
     constants,
 )
 from systems.common import geometry
-from tests.benchmarks.bypass_planners import _ROOM, NO_CONE
-from tests.benchmarks.bypass_scenes import blocked_scene
-from tests.benchmarks.bypass_suite import run_scene
-from tests.benchmarks.crossed_scenes import CONTACT
 
 G = (0.0, 0.0, 0.0)
 RECORD = constants(ToolBypassParams())[0]
@@ -31,7 +29,7 @@ def tools(*pairs) -> np.ndarray:
 
 def chosen(p, goal, rows, edge=STRAIGHT, waits=0):
     """The way at one instant, in a workspace without borders."""
-    return choose_way(RECORD, _ROOM, NO_CONE, G, p, goal, rows, edge, waits)
+    return choose_way(RECORD, ROOM, NO_CONE, G, p, goal, rows, edge, waits)
 
 
 def test_a_free_way_is_straight_and_a_crossed_one_goes_over_an_edge():
@@ -87,12 +85,12 @@ def test_where_no_edge_will_do_it_retracts_turns_and_inserts():
 
 def test_it_waits_at_a_free_pose_near_the_target():
     for number in range(30):
-        given = blocked_scene(2, number)
+        given = scene("blocked", 2, number)
         a, tip = given.p_WGo, given.legs[0].p0
         row = tools((a, tip))
         _, _, _, waits, aim = choose_way(
             RECORD,
-            _ROOM,
+            ROOM,
             NO_CONE,
             given.p_WGr,
             given.p_WPr,
@@ -114,25 +112,6 @@ def test_it_waits_at_a_free_pose_near_the_target():
             and x[2] > -0.065
         ]
         assert geometry.norm(geometry.sub(aim, given.p_WPs)) < min(free) + 0.03
-
-
-@pytest.mark.parametrize(
-    "kind", ["standing", "moving", "tracked", "blocked", "crowded"]
-)
-def test_random_scenes_are_reached_without_contact(kind):
-    for number in range(12):
-        result = run_scene(kind, "bypass", 21, number)
-        assert result.outcome.reached, number
-        assert result.outcome.clearance > (0.002 if kind == "standing" else 0.0005)
-
-
-def test_the_sum_of_potentials_stalls_where_the_bypass_arrives():
-    stalled = [
-        number
-        for number in range(10)
-        if not run_scene("standing", "field + constraint", 21, number).outcome.reached
-    ]
-    assert len(stalled) >= 3
 
 
 def fixed(dut):

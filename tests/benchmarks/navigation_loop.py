@@ -6,7 +6,7 @@ from math import atan2, cos, hypot, sin
 from time import perf_counter
 
 from systems.switching.unicycle_control import UnicycleControlParams, heading_law
-from tests.benchmarks.scenes import Frame, Robot, Scene
+from tests.benchmarks.navigation_scenes import Frame, Robot, Scene
 
 Seen = list[tuple[float, float, float, float, float, float]]
 """Track identity, x, y, radius, v_x, v_y of the obstacles in sight."""

@@ -7,21 +7,13 @@ offering `step`.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from systems.auto_guidance import (
-    backward_movement,
-    fuzzy_arbiter,
-    go_to_target,
-    velocity_corrections,
-)
-from systems.auto_guidance.backward_movement import BackwardMovementParams
-from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
-from systems.auto_guidance.go_to_target import GoToTargetParams
-from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
+from diagrams.gauze.scenes import CONTACT, Scene
+from systems.common.compiled import Numbers
 from systems.common.geometry import (
     Vector,
     along,
@@ -32,7 +24,6 @@ from systems.common.geometry import (
     sub,
     unit,
 )
-from tests.benchmarks.crossed_scenes import CONTACT, Scene
 
 PLANNER_PERIOD = 1.0 / 60.0
 
@@ -43,9 +34,9 @@ class Planner(Protocol):
     def step(
         self,
         dt: float,
-        robot_tool: Sequence[float],
-        obstacle: Sequence[float],
-        target: Sequence[float],
+        robot_tool: Numbers,
+        obstacle: Numbers,
+        target: Numbers,
         others: Sequence[np.ndarray] = (),
     ) -> Vector:
         """The velocity of the robot's tip for the next `dt` seconds, m/s.
@@ -57,92 +48,6 @@ class Planner(Protocol):
             target: Estimate (17) of S.
             others: Estimates (17) of further tools.
         """
-
-
-@dataclass
-class LocalPlanner:
-    """The paper's local planner (Figure 4): the functions of the four blocks.
-
-    Attributes:
-        go: Parameters of go to target.
-        corrections: Of the velocity corrections.
-        backward: Of the backward movement.
-        arbiter: Of the fuzzy arbiter.
-        field_only: Commands v_1 alone, for comparison.
-        v1, v2, v3, v_R: The last step's velocities of the guide point, m/s.
-        guide: The last step's guide signal (12).
-        weights: The last step's c_1, c_2, c_3.
-    """
-
-    go: GoToTargetParams = field(default_factory=GoToTargetParams)
-    corrections: VelocityCorrectionsParams = field(
-        default_factory=VelocityCorrectionsParams
-    )
-    backward: BackwardMovementParams = field(default_factory=BackwardMovementParams)
-    arbiter: FuzzyArbiterParams = field(default_factory=FuzzyArbiterParams)
-    field_only: bool = False
-
-    def __post_init__(self) -> None:
-        """Starts from rest."""
-        self._go = go_to_target.constants(self.go)[0]
-        self._corrections = velocity_corrections.constants(self.corrections)[0]
-        self._backward = backward_movement.constants(self.backward)[0]
-        self._arbiter = fuzzy_arbiter.constants(self.arbiter)[0]
-        self._v1_tip: Vector = (0.0, 0.0, 0.0)
-        self._v_tip: Vector = (0.0, 0.0, 0.0)
-        self.v3: Vector = (0.0, 0.0, 0.0)
-
-    def step(
-        self,
-        dt: float,
-        robot_tool: Sequence[float],
-        obstacle: Sequence[float],
-        target: Sequence[float],
-        others: Sequence[np.ndarray] = (),
-    ) -> Vector:
-        """The velocity of the robot's tip, see `Planner`."""
-        robot_tool = np.asarray(robot_tool, float)
-        self._v1_tip, guide = self._go_to_target(
-            dt, robot_tool, obstacle, target, others
-        )
-        self.guide = np.array(guide)
-        zero = (0.0, 0.0, 0.0)
-        s = self.guide[7]
-        self.v1 = along(zero, s, self._v1_tip)
-        if self.field_only:
-            self.v2, self.v_R, self.weights = zero, self.v1, [1.0, 0.0, 0.0]
-            return self._v1_tip
-        self.v2 = velocity_corrections.velocity_correction(
-            self._corrections, self.v1, self.guide, obstacle
-        )
-        self.v3 = backward_movement.backward_movement(
-            self._backward, self.v3, dt, self.guide, obstacle
-        )
-        self.weights, self._v_tip, _ = fuzzy_arbiter.arbitrate(
-            self._arbiter,
-            self._v_tip,
-            dt,
-            (self.v1, self.v2, self.v3),
-            self.guide,
-            robot_tool,
-            obstacle,
-            target,
-        )
-        self.v_R = along(zero, s, self._v_tip)
-        return self._v_tip
-
-    def _go_to_target(
-        self,
-        dt: float,
-        robot_tool: np.ndarray,
-        obstacle: Sequence[float],
-        target: Sequence[float],
-        others: Sequence[np.ndarray],
-    ) -> tuple[Vector, tuple[float, ...]]:
-        """v_1 / s and the guide signal; another form of the behaviour goes here."""
-        return go_to_target.go_to_target(
-            self._go, self._v1_tip, dt, robot_tool, obstacle, target
-        )
 
 
 def estimate(
@@ -241,9 +146,8 @@ def run(
         obstacle = estimate(p, scene.p_WGo, v, a)
         if sense:
             obstacle = sense(time, obstacle)
-        v_tip = planner.step(
-            PLANNER_PERIOD, [*scene.p_WGr, *tip], obstacle, target, others
-        )
+        robot_tool = np.array([*scene.p_WGr, *tip])
+        v_tip = planner.step(PLANNER_PERIOD, robot_tool, obstacle, target, others)
         if watch:
             watch(time, tip)
         for i in range(substeps):
