@@ -133,7 +133,7 @@ def tool_rows(margins: Any, estimates: np.ndarray) -> np.ndarray:
     """Obstacle tools (n, 11) of estimates (n, 17)."""
     rows = np.empty((len(estimates), COLUMNS))
     for i in range(len(estimates)):
-        write_tool(rows[i], tool_of(margins, read_estimate(estimates[i]), 0.0))
+        write_tool(rows, i, tool_of(margins, read_estimate(estimates[i]), 0.0))
     return rows
 
 
@@ -171,15 +171,15 @@ def obstacle_tools(
         camera: Of the endoscope.
     """
     rows = np.empty((3, COLUMNS))
-    write_tool(rows[0], tool_of(margins, obstacle, 0.0))
+    write_tool(rows, 0, tool_of(margins, obstacle, 0.0))
     count = 1
     if margins.avoid_target:
         is_left, shaft = target_shaft(margins, g, target)
         if is_left:
-            write_tool(rows[count], shaft)
+            write_tool(rows, count, shaft)
             count += 1
     if margins.avoid_camera and usable(camera):
         thicker = margins.camera_distance - margins.safe_distance
-        write_tool(rows[count], tool_of(margins, camera, thicker))
+        write_tool(rows, count, tool_of(margins, camera, thicker))
         count += 1
     return rows[:count]

@@ -196,7 +196,7 @@ class StepBlock(Block):
         """The step as a function of the context, and the tickets of what it reads."""
         run = wired(step, len(constants), states, list(inputs.values()), gives, timed)
         ports = {name: self.signal_in(name, inputs[name]) for name in inputs}
-        reads = [_reading(ports[name], defaults.get(name)) for name in inputs]
+        reads = [_reader(ports[name], defaults.get(name)) for name in inputs]
         groups = range(len(states))
 
         def of_context(context: Any) -> np.ndarray:
@@ -214,17 +214,17 @@ class StepBlock(Block):
     def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
         """Declares outputs that are the shared array's parts from `first` on."""
         for name, signal in outputs.items():
-            part = slice(first, first + length(signal))
-            self.signal_out(
-                name,
-                signal,
-                lambda context, part=part: shared.Eval(context)[part],
-                {shared.ticket()},
-            )
-            first = part.stop
+            last = first + length(signal)
+
+            def part(context: Any, first: int = first, last: int = last) -> np.ndarray:
+                array: np.ndarray = shared.Eval(context)
+                return array[first:last]
+
+            self.signal_out(name, signal, part, {shared.ticket()})
+            first = last
 
 
-def _reading(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
+def _reader(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
     """What reads a port; its default, if it has one, where it is not connected."""
     read: Callable[[Any], np.ndarray] = port.Eval
     if default is None:

@@ -33,7 +33,7 @@ from systems.common.geometry import (
 )
 from systems.common.parameter import Rules, check, parameter
 from systems.common.reach_limits import ReachLimits
-from systems.common.signal import Field, Vector, example
+from systems.common.signal import Field, Vector, example, vector
 from systems.common.signals import (
     FREE,
     Estimate,
@@ -298,8 +298,8 @@ class ToolNavigation(StepBlock):
         super().__init__()
         params = params or ToolNavigationParams()
         still = (0.0, 0.0, 0.0)
-        tip: Any = tuple(p_WP)
-        u = unit(sub(tip, tuple(p_WG)), _DOWN)
+        tip = vector(p_WP)
+        u = unit(sub(tip, vector(p_WG)), _DOWN)
         self.declare_update(
             _update,
             [constants(params)],
