@@ -10,20 +10,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from diagrams.gauze.scenes import CONTACT, Scene
-from systems.common.compiled import Numbers
 from systems.common.geometry import (
-    Vector,
+    across,
     along,
     closest_points,
     dot,
     limited,
     norm,
+    plus,
     sub,
     unit,
 )
+from systems.common.signal import Vector, vector
+from systems.common.signals import Estimate, RobotTool
 
 PLANNER_PERIOD = 1.0 / 60.0
 
@@ -34,19 +34,19 @@ class Planner(Protocol):
     def step(
         self,
         dt: float,
-        robot_tool: Numbers,
-        obstacle: Numbers,
-        target: Numbers,
-        others: Sequence[np.ndarray] = (),
+        robot: RobotTool,
+        obstacle: Estimate,
+        target: Estimate,
+        others: Sequence[Estimate] = (),
     ) -> Vector:
         """The velocity of the robot's tip for the next `dt` seconds, m/s.
 
         Args:
             dt: Length of the step, s.
-            robot_tool: G_R, P_R (6), m.
-            obstacle: Estimate (17) of O.
-            target: Estimate (17) of S.
-            others: Estimates (17) of further tools.
+            robot: R.
+            obstacle: Of O.
+            target: Of S.
+            others: Of further tools.
         """
 
 
@@ -55,9 +55,10 @@ def estimate(
     fulcrum: Sequence[float],
     v: Sequence[float] = (0.0, 0.0, 0.0),
     a: Sequence[float] = (0.0, 0.0, 0.0),
-) -> np.ndarray:
-    """An exact estimate (17) of a tool."""
-    return np.array([*p, *v, *a, *fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0])
+) -> Estimate:
+    """An exact estimate of a tool."""
+    exact = (0.0, 0.0, 0.0, 1.0, 0.0)
+    return Estimate(vector(p), vector(v), vector(a), vector(fulcrum), *exact)
 
 
 @dataclass(frozen=True)
@@ -74,22 +75,18 @@ class Robot:
     max_turning: float = 1.0
     least_insertion: float = 0.015
 
-    def moved(self, g: Vector, p: Vector, v: Sequence[float], dt: float) -> Vector:
+    def moved(self, g: Vector, p: Vector, v: Vector, dt: float) -> Vector:
         """The tip after `dt` seconds at velocity v within the limits."""
         shaft = sub(p, g)
         q = norm(shaft)
         u = unit(shaft)
-        along_u = dot(v, u)
-        turning = limited(
-            (v[0] - along_u * u[0], v[1] - along_u * u[1], v[2] - along_u * u[2]),
-            q * self.max_turning,
-        )
-        velocity = limited(along(turning, along_u, u), self.max_speed)
+        turning = limited(across(v, u), q * self.max_turning)
+        velocity = limited(along(turning, dot(v, u), u), self.max_speed)
         shaft = sub(along(p, dt, velocity), g)
         q = norm(shaft)
         if q < self.least_insertion:
             return along(g, self.least_insertion / q, shaft)
-        return along(g, 1.0, shaft)
+        return plus(g, shaft)
 
 
 @dataclass
@@ -118,7 +115,7 @@ def run(
     robot: Robot | None = None,
     time_limit: float = 15.0,
     watch: Callable[[float, Vector], None] | None = None,
-    sense: Callable[[float, np.ndarray], np.ndarray] | None = None,
+    sense: Callable[[float, Estimate], Estimate] | None = None,
 ) -> Outcome:
     """Runs a scene to its end: contact, arrival with O at rest, or the limit.
 
@@ -146,25 +143,25 @@ def run(
         obstacle = estimate(p, scene.p_WGo, v, a)
         if sense:
             obstacle = sense(time, obstacle)
-        robot_tool = np.array([*scene.p_WGr, *tip])
-        v_tip = planner.step(PLANNER_PERIOD, robot_tool, obstacle, target, others)
+        tool = RobotTool(scene.p_WGr, tip)
+        v_tip = planner.step(PLANNER_PERIOD, tool, obstacle, target, others)
         if watch:
             watch(time, tip)
         for i in range(substeps):
             tip = robot.moved(scene.p_WGr, tip, v_tip, dt)
             p = scene.obstacle_tip(time + (i + 1) * dt)[0]
-            _, l_share, axes, _, _ = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
-            if axes - CONTACT < clearance:
-                clearance, fraction = axes - CONTACT, l_share
+            near = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
+            if near.distance - CONTACT < clearance:
+                clearance, fraction = near.distance - CONTACT, near.t
             for p, g in scene.others:
-                axes = closest_points(scene.p_WGr, tip, g, p)[2]
-                if axes - CONTACT < clearance:
-                    clearance, fraction = axes - CONTACT, 1.0
+                near = closest_points(scene.p_WGr, tip, g, p)
+                if near.distance - CONTACT < clearance:
+                    clearance, fraction = near.distance - CONTACT, 1.0
         if clearance <= 0.0:
             return Outcome(False, True, clearance, fraction, arrival)
-        near = norm(sub(tip, scene.p_WPs)) < 1e-3
-        if near and arrival is None:
+        is_there = norm(sub(tip, scene.p_WPs)) < 1e-3
+        if is_there and arrival is None:
             arrival = time + PLANNER_PERIOD
-        if near and norm(v_tip) < 2e-3 and time > scene.rest_time:
+        if is_there and norm(v_tip) < 2e-3 and time > scene.rest_time:
             return Outcome(True, False, clearance, fraction, arrival)
     return Outcome(False, False, clearance, fraction, arrival)

@@ -15,7 +15,7 @@ from systems.auto_guidance import (
     velocity_corrections,
 )
 from systems.auto_guidance.backward_movement import BackwardMovementParams
-from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
+from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams, Weights
 from systems.auto_guidance.go_to_target import GoToTargetParams, guide_point
 from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
 from systems.bypass import (
@@ -28,20 +28,18 @@ from systems.bypass.clearance_constraint import ClearanceConstraintParams
 from systems.bypass.obstacle_tools import Margins
 from systems.bypass.tool_bypass import ToolBypassParams
 from systems.bypass.workspace import WorkspaceParams
-from systems.common.compiled import Numbers
-from systems.common.geometry import Vector, along, xyz
+from systems.common.geometry import scaled
+from systems.common.reach_limits import ReachLimits
+from systems.common.signal import Vector, flat
+from systems.common.signals import Estimate, Guide, RobotTool, ViewCone
 
 ROBOT = Robot()
 SPEED = ROBOT.max_speed
-NO_CONE = np.array([0.0, 0.0, 0.2, 0.0, 0.0, -1.0, 3.2])
+NO_CONE = ViewCone((0.0, 0.0, 0.2), (0.0, 0.0, -1.0), 3.2)
 """A view cone that holds everything: there is no camera in the scenes."""
 ROOM = workspace.constants(
-    WorkspaceParams(
-        min_insertion=ROBOT.least_insertion,
-        max_insertion=0.5,
-        max_tilt=3.1,
-        floor=-0.065,
-    )
+    ReachLimits(min_insertion=ROBOT.least_insertion, max_insertion=0.5, max_tilt=3.1),
+    WorkspaceParams(floor=-0.065),
 )[0]
 """The scenes' workspace."""
 BYPASS = ToolBypassParams(max_speed=SPEED)
@@ -49,9 +47,10 @@ CLEARANCE = ClearanceConstraintParams(max_speed=SPEED, turning_speed=ROBOT.max_t
 _MARGINS = obstacle_tools.constants(Margins())[0]
 
 
-def around(obstacle: Numbers, others: Sequence[np.ndarray]) -> np.ndarray:
+def around(obstacle: Estimate, others: Sequence[Estimate]) -> np.ndarray:
     """Obstacle tools (n, 11) of the estimates of O and of the further tools."""
-    rows: np.ndarray = obstacle_tools.tool_rows(_MARGINS, np.array([obstacle, *others]))
+    estimates = np.array([flat(tool) for tool in (obstacle, *others)])
+    rows: np.ndarray = obstacle_tools.tool_rows(_MARGINS, estimates)
     return rows
 
 
@@ -66,8 +65,8 @@ class LocalPlanner:
         arbiter: Of the fuzzy arbiter.
         field_only: Commands v_1 alone, for comparison.
         v1, v2, v3, v_R: The last step's velocities of the guide point, m/s.
-        guide: The last step's guide signal (12).
-        weights: The last step's c_1, c_2, c_3.
+        guide: The last step's guide.
+        weights: The last step's weights.
     """
 
     go: GoToTargetParams = field(default_factory=GoToTargetParams)
@@ -91,20 +90,20 @@ class LocalPlanner:
     def step(
         self,
         dt: float,
-        robot_tool: Numbers,
-        obstacle: Numbers,
-        target: Numbers,
-        others: Sequence[np.ndarray] = (),
+        robot: RobotTool,
+        obstacle: Estimate,
+        target: Estimate,
+        others: Sequence[Estimate] = (),
     ) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
-        tool = np.asarray(robot_tool, float)
-        self._v1_tip, guide = self._go_to_target(dt, tool, obstacle, target, others)
-        self.guide = np.array(guide)
-        zero = (0.0, 0.0, 0.0)
-        s = self.guide[7]
-        self.v1 = along(zero, s, self._v1_tip)
+        self._v1_tip, self.guide = self._go_to_target(
+            dt, robot, obstacle, target, others
+        )
+        s = self.guide.s
+        self.v1 = scaled(s, self._v1_tip)
         if self.field_only:
-            self.v2, self.v_R, self.weights = zero, self.v1, (1.0, 0.0, 0.0)
+            self.v2, self.v_R = (0.0, 0.0, 0.0), self.v1
+            self.weights = Weights(1.0, 0.0, 0.0)
             return self._v1_tip
         self.v2 = velocity_corrections.velocity_correction(
             self._corrections, self.v1, self.guide, obstacle
@@ -118,24 +117,24 @@ class LocalPlanner:
             dt,
             (self.v1, self.v2, self.v3),
             self.guide,
-            tool,
+            robot,
             obstacle,
             target,
         )
-        self.v_R = along(zero, s, self._v_tip)
+        self.v_R = scaled(s, self._v_tip)
         return self._v_tip
 
     def _go_to_target(
         self,
         dt: float,
-        robot_tool: np.ndarray,
-        obstacle: Numbers,
-        target: Numbers,
-        others: Sequence[np.ndarray],
-    ) -> tuple[Vector, tuple[float, ...]]:
-        """v_1 / s and the guide signal; another form of the behaviour goes here."""
+        robot: RobotTool,
+        obstacle: Estimate,
+        target: Estimate,
+        others: Sequence[Estimate],
+    ) -> tuple[Vector, Guide]:
+        """v_1 / s and the guide; another form of the behaviour goes here."""
         return go_to_target.go_to_target(
-            self._go, self._v1_tip, dt, robot_tool, obstacle, target
+            self._go, self._v1_tip, dt, robot, obstacle, target
         )
 
 
@@ -154,12 +153,11 @@ class Bypass(LocalPlanner):
     def _go_to_target(
         self,
         dt: float,
-        robot_tool: np.ndarray,
-        obstacle: Numbers,
-        target: Numbers,
-        others: Sequence[np.ndarray],
-    ) -> tuple[Vector, tuple[float, ...]]:
-        g, p, goal = xyz(robot_tool, 0), xyz(robot_tool, 3), xyz(target, 0)
+        robot: RobotTool,
+        obstacle: Estimate,
+        target: Estimate,
+        others: Sequence[Estimate],
+    ) -> tuple[Vector, Guide]:
         edge = self.edge
         v_tip, self.edge, self.waits, _ = tool_bypass.bypass(
             self._bypass,
@@ -167,18 +165,17 @@ class Bypass(LocalPlanner):
             NO_CONE,
             self._v1_tip,
             dt,
-            g,
-            p,
-            goal,
+            robot.fulcrum,
+            robot.tip,
+            target.p,
             (0.0, 0.0, 0.0),
             around(obstacle, others),
             edge,
             self.waits,
         )
         self.edge_switches += edge > 0 and self.edge > 0 and edge != self.edge
-        return v_tip, guide_point(
-            robot_tool, obstacle, goal, self.bypass.proportion_floor
-        )
+        floor = self.bypass.proportion_floor
+        return v_tip, guide_point(robot, obstacle, target.p, floor)
 
 
 @dataclass
@@ -205,29 +202,28 @@ class Constrained:
     def step(
         self,
         dt: float,
-        robot_tool: Numbers,
-        obstacle: Numbers,
-        target: Numbers,
-        others: Sequence[np.ndarray] = (),
+        robot: RobotTool,
+        obstacle: Estimate,
+        target: Estimate,
+        others: Sequence[Estimate] = (),
     ) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
         start = time.perf_counter()
-        wanted = self.inner.step(dt, robot_tool, obstacle, target, others)
-        g, p = xyz(robot_tool, 0), xyz(robot_tool, 3)
+        wanted = self.inner.step(dt, robot, obstacle, target, others)
         v: Vector
         v, self._dodging, status = clearance_constraint.constrain(
             self._record,
             ROOM,
             NO_CONE,
-            g,
-            p,
+            robot.fulcrum,
+            robot.tip,
             wanted,
             around(obstacle, others),
             self._dodging,
         )
         self.seconds.append(time.perf_counter() - start)
-        if status[1]:
-            self.holds = self.holds and status[2] > 0.5
+        if status.near:
+            self.holds = self.holds and status.condition > 0.5
         return v
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
-from systems.motion.tool_navigation import REASONS, WAITING
+from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
 """The gauze is delivered while the tip is this close to S's true tip [m] ..."""
@@ -34,16 +34,14 @@ def stops(time: np.ndarray, codes: np.ndarray) -> list[dict[str, Any]]:
     Waiting for the tracker's first frame is no stop: the robot has not moved yet.
     """
     found = []
-    for code, reason in REASONS.items():
-        if code == WAITING:
-            continue
-        for first, last in spans(np.round(codes) == code):
+    for stop in set(Stop) - {Stop.MOVING, Stop.WAITING}:
+        for first, last in spans(np.round(codes) == stop):
             end = time[min(last + 1, len(time) - 1)]
             start = float(time[first])
             found.append(
-                {"reason": reason, "start": start, "duration": float(end) - start}
+                {"reason": stop.text, "start": start, "duration": float(end) - start}
             )
-    return sorted(found, key=lambda stop: stop["start"])
+    return sorted(found, key=lambda one: one["start"])
 
 
 def in_cone(points: np.ndarray, cone: Any) -> np.ndarray:

@@ -3,8 +3,6 @@
 from dataclasses import dataclass, replace
 import math
 
-import numpy as np
-
 from diagrams.bedside.bedside import ToolAtStart
 from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
@@ -22,7 +20,10 @@ from systems.bypass.clearance_constraint import ClearanceConstraintParams
 from systems.bypass.obstacle_tools import Margins
 from systems.bypass.tool_bypass import ToolBypassParams
 from systems.bypass.workspace import WorkspaceParams
+from systems.common.geometry import sub, unit
 from systems.common.parameter import parameter, part
+from systems.common.signal import vector
+from systems.common.signals import ViewCone
 from systems.motion.endoscope import EndoscopeParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.motion.tool_navigation import (
@@ -148,25 +149,22 @@ def _check_reach(scenario: GauzeScenario) -> None:
     """The start and S's first tip must be reachable and in view."""
     limits = scenario.navigation
     record = constants(limits)[0]
-    p_WG = scenario.robot.p_WG
+    p_WG, apex = vector(scenario.robot.p_WG), vector(scenario.camera.p_WG)
     for name, point in (
         ("robot.p_WP", scenario.robot.p_WP),
         ("target.points[0]", scenario.target.points[0]),
     ):
-        if not reachable(record, tuple(p_WG), tuple(point)):
+        if not reachable(record, p_WG, vector(point)):
             raise ScenarioError(
                 f"{name}={point} is out of reach through robot.p_WG="
                 f"{scenario.robot.p_WG}: expected an insertion in "
                 f"[{limits.min_insertion}, {limits.max_insertion}] m and a tilt of at "
                 f"most {limits.max_tilt} rad"
             )
-    apex = scenario.camera.p_WG
     start = scenario.target.points[0]
-    axis = [p - a for p, a in zip(scenario.camera.p_WS, apex, strict=True)]
-    length = math.hypot(*axis)
-    half_angle = scenario.camera.half_angle
-    cone = np.array([*apex, *(x / length for x in axis), half_angle])
-    if cone_angle(cone, tuple(start)) > scenario.camera.half_angle:
+    axis = unit(sub(vector(scenario.camera.p_WS), apex))
+    cone = ViewCone(apex, axis, scenario.camera.half_angle)
+    if cone_angle(cone, vector(start)) > cone.half:
         raise ScenarioError(
             f"target.points[0]={start} lies outside the view cone of half angle "
             f"{scenario.camera.half_angle} rad about camera.p_WS={scenario.camera.p_WS}"

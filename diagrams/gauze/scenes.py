@@ -188,7 +188,7 @@ def _draw(rng: np.random.Generator, kind: str) -> Scene | None:
     if moving:
         legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
         return Scene(g_r, start, goal, g_o, legs) if legs else None
-    if closest_points(g_r, goal, g_o, tip)[2] < _FREE:
+    if closest_points(g_r, goal, g_o, tip).distance < _FREE:
         return None
     return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
 
@@ -204,7 +204,7 @@ def _draw_blocked(rng: np.random.Generator) -> Scene | None:
         return None
     for _ in range(_FEW_TRIES):
         tip = _draw_tip(rng, dome, g_o)
-        rho = closest_points(g_r, goal, g_o, tip)[2]
+        rho = closest_points(g_r, goal, g_o, tip).distance
         if rho < _BLOCKED and _stands_well(g_r, g_o, tip, start):
             break
     else:
@@ -212,7 +212,7 @@ def _draw_blocked(rng: np.random.Generator) -> Scene | None:
     for _ in range(_FEW_TRIES):
         away = _draw_tip(rng, dome, g_o)
         leg = Leg(_BLOCKED_TIME, tip, away, _LEAVING_SPEED)
-        clear = closest_points(g_r, goal, g_o, away)[2] >= _BLOCKED + 0.004
+        clear = closest_points(g_r, goal, g_o, away).distance >= _BLOCKED + 0.004
         between = [leg.at(_BLOCKED_TIME + 0.1 * k)[0] for k in range(50)]
         if clear and all(_far_from(g_r, g_o, p, 0.03) for p in between):
             stand = Leg(0.0, tip, tip, _LEAVING_SPEED)
@@ -235,7 +235,7 @@ def _draw_crowded(rng: np.random.Generator, seed: int, number: int) -> Scene:
             taken = [base.p_WGr, base.p_WGo, *(other[1] for other in others)]
             if any(norm(sub(g, one)) < 0.04 for one in taken):
                 continue
-            free = closest_points(base.p_WGr, base.p_WPs, g, tip)[2] >= _FREE
+            free = closest_points(base.p_WGr, base.p_WPs, g, tip).distance >= _FREE
             if free and _stands_well(base.p_WGr, g, tip, base.p_WPr):
                 others.append((tip, g))
             if len(others) == more:
@@ -255,7 +255,7 @@ def _stands_well(
     from_g_r: float = _FROM_G_R,
 ) -> bool:
     """Whether a tool is clear of R's pose and of its fulcrum."""
-    clear = closest_points(g_r, pose, g_o, tip)[2] >= CONTACT + room
+    clear = closest_points(g_r, pose, g_o, tip).distance >= CONTACT + room
     return clear and _far_from(g_r, g_o, tip, from_g_r)
 
 
@@ -304,7 +304,7 @@ def _wander(
             _far_from(g_r, g_o, along(p0, k / 20, way), from_g_r) for k in range(21)
         ):
             continue
-        if last and closest_points(g_r, goal, g_o, leg.p1)[2] < _FREE:
+        if last and closest_points(g_r, goal, g_o, leg.p1).distance < _FREE:
             continue
         legs.append(leg)
         time = leg.end

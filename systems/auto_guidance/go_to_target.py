@@ -89,8 +89,8 @@ class GoToTargetParams:
     influence_distance: float = parameter(0.025, "rho_0", "m", above=0.0, most=0.2)
     contact_distance: float = parameter(
         0.005,
-        "subtracted from the axes' distance to give the rho of the potential: the sum of "
-        "both tools' radii for the distance of the surfaces, 0 for that of the axes",
+        "taken from the axes' distance to give the rho of the potential: both tools' "
+        "radii for the distance of the surfaces, 0 for that of the axes",
         "m",
         least=0.0,
         most=0.02,

@@ -95,7 +95,7 @@ class VelocityCorrectionsParams:
     )
     moving_speed: float = parameter(
         0.01,
-        "speed of O's tip from which on corrections count in full; not at all below half",
+        "speed of O's tip from which on they count in full; not at all below half",
         "m/s",
         above=0.0,
         most=0.1,
@@ -283,5 +283,6 @@ class VelocityCorrections(StepBlock):
             _correct,
             [constants(params or VelocityCorrectionsParams())],
             {"v1": Velocity, "guide": Guide, "obstacle": Estimate},
-            {"v2": Velocity},
+            "v2",
+            Velocity,
         )

@@ -37,7 +37,7 @@ _HALVINGS = 12
 class Choice(NamedTuple):
     """The way of R's tip: its direction, length in m and number; where it goes to.
 
-    That is the target, or a pose to wait in of the number `waits`, 0 if R does not wait.
+    That is the target, or a pose to wait in: number `waits`, 0 if R does not wait.
     """
 
     direction: Vector

@@ -315,11 +315,12 @@ def _step(
     view_cone: ViewCone,
     permission: Permission,
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
     known = usable(obstacle) and usable(target)
-    numbers = all_finite(v_R.v) and finite_guide(guide) and finite_tool(robot)
-    if not (known and numbers and finite_cone(view_cone)):
+    numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
+    if not (known and numbers):
         nothing = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return np.zeros(TOOLS), v_R, nothing
+        return np.zeros(TOOLS), Velocity(v), nothing
     g, s = robot.fulcrum, guide.s
     tools = obstacle_tools(margins, g, obstacle, target, camera)
     share = max(0.0, min(1.0, permission.speed_scale)) / s
@@ -329,7 +330,7 @@ def _step(
         view_cone,
         g,
         robot.tip,
-        scaled(share, v_R.v),
+        scaled(share, v),
         tools,
         dodging,
     )
@@ -341,7 +342,8 @@ class ClearanceConstraint(StepBlock):
 
     After the fuzzy sum, before the tool's navigation; see the module. While an estimate
     is not usable or an input is not finite the velocity passes as it is: then the
-    arbiter slows R down and the navigation stops it.
+    arbiter slows R down and the navigation stops it. A wanted velocity that is not
+    finite counts as zero.
 
     Port ``v_R`` accepts the wanted `Velocity` of the guide point.
     Port ``guide`` accepts the `Guide`, of which s is used.
@@ -350,8 +352,8 @@ class ClearanceConstraint(StepBlock):
     Port ``target`` accepts the `Estimate` of the target tool S.
     Port ``camera`` accepts the `Estimate` of the endoscope.
     Port ``view_cone`` accepts the `ViewCone`.
-    Port ``permission`` accepts the passive wrist's `Permission`; full speed if it is not
-    connected. Evasion is not slowed.
+    Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
+    Evasion is not slowed.
     Port ``v_safe`` emits the `Velocity` of the guide point.
     Port ``status`` emits the `ClearanceStatus`.
 
@@ -383,9 +385,7 @@ class ClearanceConstraint(StepBlock):
             [
                 constants(params),
                 tools_around.constants(margins or Margins()),
-                limits.constants(
-                    reach or ReachLimits(), workspace or WorkspaceParams()
-                ),
+                limits.constants(reach, workspace),
             ],
             {
                 "v_R": Velocity,

@@ -37,7 +37,7 @@ class Margins:
 
     safe_distance: float = parameter(
         0.007,
-        "D_safe, that the clearance constraint holds",
+        "D_safe, that is held",
         "m",
         least=0.005,
         most=0.03,
@@ -59,7 +59,7 @@ class Margins:
     avoid_camera: bool = parameter(True, "whether the endoscope is one")
     sigmas: float = parameter(
         3.0,
-        "standard deviations of an estimate that are added",
+        "of an estimate's standard deviations that are added",
         "1",
         least=0.0,
         most=10.0,
@@ -133,7 +133,7 @@ def tool_rows(margins: Any, estimates: np.ndarray) -> np.ndarray:
     """Obstacle tools (n, 11) of estimates (n, 17)."""
     rows = np.empty((len(estimates), COLUMNS))
     for i in range(len(estimates)):
-        write_tool(rows[i], tool_of(margins, read_estimate(estimates[i]), 0.0))
+        write_tool(rows, i, tool_of(margins, read_estimate(estimates[i]), 0.0))
     return rows
 
 
@@ -171,15 +171,15 @@ def obstacle_tools(
         camera: Of the endoscope.
     """
     rows = np.empty((3, COLUMNS))
-    write_tool(rows[0], tool_of(margins, obstacle, 0.0))
+    write_tool(rows, 0, tool_of(margins, obstacle, 0.0))
     count = 1
     if margins.avoid_target:
         is_left, shaft = target_shaft(margins, g, target)
         if is_left:
-            write_tool(rows[count], shaft)
+            write_tool(rows, count, shaft)
             count += 1
     if margins.avoid_camera and usable(camera):
         thicker = margins.camera_distance - margins.safe_distance
-        write_tool(rows[count], tool_of(margins, camera, thicker))
+        write_tool(rows, count, tool_of(margins, camera, thicker))
         count += 1
     return rows[:count]

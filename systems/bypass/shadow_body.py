@@ -31,7 +31,7 @@ from systems.common.geometry import (
     sub,
     unit,
 )
-from systems.common.signal import Field, Vector, reader, writer
+from systems.common.signal import Field, Vector, reader, row_writer
 
 FAR = 1.0
 """A depth beyond any tool's reach, m."""
@@ -48,7 +48,7 @@ class ObstacleTool(NamedTuple):
 
 
 read_tool = reader(ObstacleTool)
-write_tool = writer(ObstacleTool)
+write_tool = row_writer(ObstacleTool)
 
 
 @compiled

@@ -50,8 +50,8 @@ class Way(NamedTuple):
         float,
         Field(
             "1",
-            "0 straight, -1 up and over, 1 and 2 the top and the tip edge of O, then of "
-            "S and of the endoscope",
+            "0 straight, -1 up and over, 1 and 2 the top and the tip edge of O, then "
+            "of S and of the endoscope",
             0.0,
         ),
     ]
@@ -100,13 +100,13 @@ class ToolBypassParams:
     )
     switch_ratio: float = parameter(
         0.85,
-        "another edge is taken if it is shorter than this part",
+        "another edge is taken if shorter than this part",
         above=0.0,
         most=1.0,
     )
     switch_gain: float = parameter(
         0.005,
-        "of the one in use, and shorter by this as well",
+        "of the one in use, and by this as well",
         "m",
         least=0.0,
         most=0.1,
@@ -268,9 +268,7 @@ class ToolBypass(StepBlock):
             [
                 constants(params),
                 tools_around.constants(margins or Margins()),
-                limits.constants(
-                    reach or ReachLimits(), workspace or WorkspaceParams()
-                ),
+                limits.constants(reach, workspace),
             ],
             {
                 "robot_tool": RobotTool,

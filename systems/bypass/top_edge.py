@@ -148,6 +148,6 @@ def top_edge(
         edge = along(edge, t_edge, o)
     else:
         edge = goal
-    sideways = plus(scaled(ex, e1), scaled(ey, e2))
-    direction = over(along(sideways, slope, o), hypot(1.0, slope))
+    round_o = plus(scaled(ex, e1), scaled(ey, e2))
+    direction = over(along(round_o, slope, o), hypot(1.0, slope))
     return Route(True, total, direction, edge)

@@ -36,8 +36,11 @@ class WorkspaceParams:
     )
 
 
-def constants(limits: ReachLimits, workspace: WorkspaceParams) -> np.ndarray:
-    """The limits of R's tip as the compiled functions take them."""
+def constants(
+    limits: ReachLimits | None = None, workspace: WorkspaceParams | None = None
+) -> np.ndarray:
+    """The limits of R's tip as the compiled functions take them; defaults if None."""
+    limits, workspace = limits or ReachLimits(), workspace or WorkspaceParams()
     check(limits)
     check(workspace)
     return packed(

@@ -33,7 +33,7 @@ from systems.common.geometry import (
 )
 from systems.common.parameter import Rules, check, parameter
 from systems.common.reach_limits import ReachLimits
-from systems.common.signal import Field, Vector, example
+from systems.common.signal import Field, Vector, example, vector
 from systems.common.signals import (
     FREE,
     Estimate,
@@ -53,7 +53,7 @@ from systems.common.stops import Stop
 
 NEVER_SEEN = 1.0
 """An estimate's standard deviation before the tool was ever seen [m]."""
-_START = example(RobotTool)
+START = example(RobotTool)
 _DOWN = (0.0, 0.0, -1.0)
 """The shaft's direction where it has none."""
 
@@ -80,8 +80,8 @@ class ToolNavigationParams(ReachLimits):
     )
     min_proportion: float = parameter(
         0.1,
-        "floor of the guide point's s; below it the fulcrums lie side by side and v / s "
-        "has no meaning",
+        "floor of the guide point's s; below it the fulcrums lie side by side and "
+        "v / s has no meaning",
         above=0.0,
         most=1.0,
     )
@@ -291,14 +291,15 @@ class ToolNavigation(StepBlock):
     def __init__(
         self,
         params: ToolNavigationParams | None = None,
-        p_WP: Sequence[float] = _START.tip,
-        p_WG: Sequence[float] = _START.fulcrum,
+        p_WP: Sequence[float] = START.tip,
+        p_WG: Sequence[float] = START.fulcrum,
     ) -> None:
         """Makes the block with the tool's tip at p_WP and its fulcrum at p_WG [m]."""
         super().__init__()
         params = params or ToolNavigationParams()
         still = (0.0, 0.0, 0.0)
-        u = unit(sub(tuple(p_WP), tuple(p_WG)), _DOWN)
+        tip = vector(p_WP)
+        u = unit(sub(tip, vector(p_WG)), _DOWN)
         self.declare_update(
             _update,
             [constants(params)],
@@ -312,7 +313,7 @@ class ToolNavigation(StepBlock):
                 "permission": Permission,
             },
             {
-                "tool": ToolMotion(tuple(p_WP), u, still, still, 0.0),
+                "tool": ToolMotion(tip, u, still, still, 0.0),
                 "stop": StopCode(float(Stop.MOVING)),
             },
             params.period,

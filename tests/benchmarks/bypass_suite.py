@@ -29,7 +29,9 @@ from diagrams.gauze.scenes import Scene, scene
 from systems.bypass import tool_bypass
 from systems.bypass.bypass_route import up_and_over
 from systems.bypass.obstacle_tools import Margins
-from systems.common.geometry import Vector, along, limited, norm, sub
+from systems.common.geometry import limited, norm, plus, scaled, sub
+from systems.common.signal import Vector
+from systems.common.signals import RobotTool
 from tests.benchmarks.tracked import tracked
 
 
@@ -39,13 +41,12 @@ class Straight:
     def __init__(self) -> None:
         self._v: Vector = (0.0, 0.0, 0.0)
 
-    def step(self, dt, robot_tool, obstacle, target, others=()) -> Vector:
+    def step(self, dt, robot, obstacle, target, others=()) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
-        way = sub(target[:3], robot_tool[3:])
-        rate = BYPASS.approach_rate
-        wanted = limited((rate * way[0], rate * way[1], rate * way[2]), SPEED)
+        way = sub(target.p, robot.tip)
+        wanted = limited(scaled(BYPASS.approach_rate, way), SPEED)
         change = limited(sub(wanted, self._v), BYPASS.max_acceleration * dt)
-        self._v = along(self._v, 1.0, change)
+        self._v = plus(self._v, change)
         return self._v
 
 
@@ -55,14 +56,14 @@ class RetractTurnInsert:
     def __init__(self) -> None:
         self._params = tool_bypass.constants(BYPASS)[0]
 
-    def step(self, dt, robot_tool, obstacle, target, others=()) -> Vector:
+    def step(self, dt, robot, obstacle, target, others=()) -> Vector:
         """The velocity of the robot's tip, see `Planner`."""
-        g, p, goal = (tuple(x) for x in (robot_tool[:3], robot_tool[3:], target[:3]))
         tools = around(obstacle, others)
         keep = np.full(len(tools), Margins().safe_distance + BYPASS.goal_slack)
-        direction, length = up_and_over(tools, keep, ROBOT.least_insertion, g, p, goal)
-        speed = min(SPEED, BYPASS.approach_rate * length)
-        return along((0.0, 0.0, 0.0), speed, direction)
+        direction, length = up_and_over(
+            tools, keep, ROBOT.least_insertion, robot.fulcrum, robot.tip, target.p
+        )
+        return scaled(min(SPEED, BYPASS.approach_rate * length), direction)
 
 
 ALL = {name: make for name, make in PLANNERS.items() if name != "field only"} | {
@@ -110,7 +111,8 @@ def straight_time(given: Scene) -> float:
     for k in range(3600):
         if norm(sub(tip, given.p_WPs)) < 1e-3:
             return k * PLANNER_PERIOD
-        v = planner.step(PLANNER_PERIOD, [*given.p_WGr, *tip], target, target)
+        robot = RobotTool(given.p_WGr, tip)
+        v = planner.step(PLANNER_PERIOD, robot, target, target)
         tip = ROBOT.moved(given.p_WGr, tip, v, PLANNER_PERIOD)
     return float("nan")
 

@@ -4,17 +4,17 @@ import pytest
 
 from diagrams.gauze.kinematic_loop import Robot, estimate, run
 from diagrams.gauze.scenes import Leg, Scene
-from systems.common.geometry import norm, sub
+from systems.common.geometry import norm, scaled, sub
+from systems.common.signal import size
 
 
 class Straight:
     """A planner that goes straight at 50 mm/s and stops."""
 
-    def step(self, dt, robot_tool, obstacle, target, others=()):
+    def step(self, dt, robot, obstacle, target, others=()):
         """See `Planner`."""
-        d = sub(target[0:3], robot_tool[3:6])
-        scale = min(0.05, 10.0 * norm(d)) / max(norm(d), 1e-9)
-        return d[0] * scale, d[1] * scale, d[2] * scale
+        d = sub(target.p, robot.tip)
+        return scaled(min(0.05, 10.0 * norm(d)) / max(norm(d), 1e-9), d)
 
 
 def test_the_loop_tells_contact_from_arrival():
@@ -44,4 +44,4 @@ def test_the_robot_keeps_its_limits():
 
 def test_estimate_lays_out_the_signal():
     e = estimate((1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12))
-    assert len(e) == 17 and e[9:12].tolist() == [4, 5, 6] and e[15] == 1.0
+    assert size(type(e)) == 17 and e.fulcrum == (4.0, 5.0, 6.0) and e.known == 1.0
