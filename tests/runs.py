@@ -4,7 +4,7 @@ from functools import cache
 import json
 
 from diagrams.common.run import Run, simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 
 
 @cache

@@ -7,12 +7,8 @@ from pathlib import Path
 import sys
 
 from diagrams.common.progress import progress_bar
-from diagrams.common.scenario import (
-    ScenarioError,
-    load_scenario,
-    read_tree,
-    scenario_files,
-)
+from diagrams.common.scenario import ScenarioError, scenario_files
+from diagrams.common.tree import read_tree
 
 EXAMPLES = """\
 examples:
@@ -97,13 +93,13 @@ def run_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar run`."""
     from diagrams.common.metrics import table
     from diagrams.common.run import run_scenario
+    from diagrams.studies import load_scenario
 
     scenario = load_scenario(
         arguments.name, arguments.overrides, arguments.seed, arguments.duration
     )
     out = arguments.out or Path("out") / default_name(arguments.name)
-    with progress_bar("running", "simulated s") as progress:
-        run = run_scenario(scenario, out, not arguments.no_replay, progress)
+    run = run_scenario(scenario, out, not arguments.no_replay, progress_bar)
     if run.metrics:
         print(table(run.metrics))
     replay = "replay.html, " if not arguments.no_replay else ""
@@ -117,7 +113,7 @@ def run_command(arguments: argparse.Namespace) -> int:
 def diagram_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar diagram`."""
     from diagrams.common.block_diagram import draw_block_diagram
-    from diagrams.common.study import build
+    from diagrams.studies import build, load_scenario
 
     scenario = load_scenario(arguments.name)
     out = arguments.out or Path("out") / f"{default_name(arguments.name)}.svg"
@@ -129,6 +125,7 @@ def diagram_command(arguments: argparse.Namespace) -> int:
 def resect_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar resect`."""
     from diagrams.resection.console import run_console
+    from diagrams.studies import load_scenario
 
     scenario = load_scenario(arguments.name, arguments.overrides)
     if scenario.system != "resection":

@@ -1,34 +1,13 @@
 """The figures of the bypass and of the clearance constraint."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from diagrams.common.run import simulate
-from plants.surgeon.hunting_tool import Hunt
+from diagrams.gauze.scenario import WITHOUT_OBSTACLE
 
 HAND_OVER = 0.02
 """The robot hands over while its tip is this near to S's tip; S may be touched [m]."""
-_WITHDRAWN = 0.01
-"""Depth of O's tip where it is out of everybody's way [m]."""
-
-
-def time_without_obstacle(scenario: Any) -> float | None:
-    """Time to the target of the same scenario with O withdrawn to its trocar [s]."""
-    x, y, z = scenario.obstacle.p_WG
-    withdrawn = replace(
-        scenario.obstacle,
-        times=[0.0],
-        points=[[x, y, z - _WITHDRAWN]],
-        recording=None,
-        pushes=[],
-    )
-    twin = replace(
-        scenario, obstacle=withdrawn, recording="", hunt=Hunt(), time_ratio=False
-    )
-    arrival: float | None = simulate(twin).metrics.get("time_to_target")
-    return arrival
 
 
 def bypass_figures(
@@ -59,7 +38,7 @@ def bypass_figures(
         way = run.matrix("planner.way")
         figures["edge_switches"] = round(way[-1, 5])
         figures["waiting_time"] = float(np.mean(way[:, 1] > 0.0) * time[-1])
-    if run.scenario.time_ratio and arrival:
-        alone = time_without_obstacle(run.scenario)
+    if WITHOUT_OBSTACLE in run.case.companions and arrival:
+        alone = run.case.companions[WITHOUT_OBSTACLE].metrics.get("time_to_target")
         figures["time_ratio"] = arrival / alone if alone else None
     return figures

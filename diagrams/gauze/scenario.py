@@ -1,6 +1,6 @@
 """The scenario of a gauze delivery: every block's and part's parameters."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 
 import numpy as np
@@ -57,7 +57,7 @@ class GauzeScenario(Scenario, WristSettings):
             comparison; else they find them from the shafts' lines.
         behaviour: Form of "go to target": "bypass" (attract or bypass), or "field"
             (the paper's sum of potentials, see `go_to_target.form`).
-        time_ratio: Whether the run is repeated without O to give the figure
+        time_ratio: Whether it is run without O as well, to give the figure
             `time_ratio`.
         hunt: O chases the robot's shaft, if its speed is not 0.
         measure_from: Force figures of the wrist start here [s].
@@ -107,6 +107,30 @@ BEHAVIOURS = ("bypass", "field")
 
 LEAST_FULCRUM_DISTANCE = 0.02
 """Two trocars cannot be closer [m]."""
+
+WITHOUT_OBSTACLE = "without obstacle"
+"""Name of the run that `time_ratio` compares with."""
+
+WITHDRAWN = 0.01
+"""Depth of O's tip where it is out of everybody's way [m]."""
+
+
+def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
+    """The same scenario with O withdrawn to its trocar, if `time_ratio` asks for it."""
+    if not scenario.time_ratio:
+        return {}
+    x, y, z = scenario.obstacle.p_WG
+    withdrawn = replace(
+        scenario.obstacle,
+        times=[0.0],
+        points=[[x, y, z - WITHDRAWN]],
+        recording=None,
+        pushes=[],
+    )
+    alone = replace(
+        scenario, obstacle=withdrawn, recording="", hunt=Hunt(), time_ratio=False
+    )
+    return {WITHOUT_OBSTACLE: alone}
 
 
 def check(scenario: GauzeScenario) -> None:

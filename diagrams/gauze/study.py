@@ -12,7 +12,7 @@ from diagrams.common.study import Study, View
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.plots import plots
-from diagrams.gauze.scenario import GauzeScenario, check
+from diagrams.gauze.scenario import GauzeScenario, check, companions
 
 XYZ = ("x", "y", "z")
 SHAFT = ("tip_x", "tip_y", "tip_z", "u_x", "u_y", "u_z")
@@ -81,7 +81,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
 STUDY = Study(
     name="gauze",
     scenario=GauzeScenario,
-    make_diagram=make_gauze_diagram,
+    make_diagram=lambda case: make_gauze_diagram(case.scenario),
     check=check,
     measure=measure,
     signals=SIGNALS,
@@ -91,6 +91,7 @@ STUDY = Study(
     decorate=decorate,
     controller="tool_navigation",
     adjust=stiffen,
+    companions=companions,
     required=(
         "system",
         "duration",

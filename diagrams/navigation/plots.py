@@ -25,17 +25,6 @@ def state_names(planner: str) -> tuple[str, ...]:
     return {"switching": MODES, "statechart": STATES}.get(planner, ("sum of fields",))
 
 
-def companions(run: Any) -> dict[str, Any]:
-    """The run and those of the planners to compare with, by planner."""
-    from diagrams.common.run import simulate
-
-    runs = {run.scenario.planner: run}
-    for name in run.scenario.compare:
-        if name not in runs:
-            runs[name] = simulate(replace(run.scenario, planner=name, compare=[]))
-    return runs
-
-
 def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
     """Draws obstacles, fainter where they were earlier, start and goal.
 
@@ -153,7 +142,7 @@ def potential(run: Any, runs: dict[str, Any]) -> Figure:
 
 def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
-    runs = companions(run)
+    runs = {run.scenario.planner: run, **run.case.companions}
     figures = {"path": path(run, runs), "motion": motion(run)}
     if run.scenario.thesis_figures:
         figures["potential"] = potential(run, runs)

@@ -1,6 +1,6 @@
 """The scenario of a navigation: a robot, its planner, and what is in its way."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import atan2, hypot, isfinite
 
 from diagrams.common.scenario import Scenario, ScenarioError, nearest
@@ -58,6 +58,15 @@ def discs(scenario: NavigationScenario) -> list[tuple[float, float, float]]:
     if scenario.crowd.people:
         return [(x, y, scenario.crowd.radius) for x, y in starts(scenario.crowd)]
     return [(*place_and_velocity(o, 0.0)[:2], o.radius) for o in scenario.obstacles]
+
+
+def companions(scenario: NavigationScenario) -> dict[str, NavigationScenario]:
+    """The same world with each of the planners to compare with, by planner."""
+    return {
+        name: replace(scenario, planner=name, compare=[])
+        for name in scenario.compare
+        if name != scenario.planner
+    }
 
 
 def check(scenario: NavigationScenario) -> None:

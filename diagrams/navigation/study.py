@@ -12,7 +12,7 @@ from diagrams.common.study import Study, View
 from diagrams.navigation.diagram import CAPACITY, floor, make_navigation_diagram
 from diagrams.navigation.metrics import measure
 from diagrams.navigation.plots import plots, state_names
-from diagrams.navigation.scenario import NavigationScenario, check
+from diagrams.navigation.scenario import NavigationScenario, check, companions
 
 ROWS = ("x", "y", "radius", "v_x", "v_y")
 SIGNALS = {
@@ -71,7 +71,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
 STUDY = Study(
     name="navigation",
     scenario=NavigationScenario,
-    make_diagram=make_navigation_diagram,
+    make_diagram=lambda case: make_navigation_diagram(case.scenario),
     check=check,
     measure=measure,
     signals=SIGNALS,
@@ -79,6 +79,7 @@ STUDY = Study(
     plots=plots,
     decorate=decorate,
     controller="planner",
+    companions=companions,
     required=("system", "duration", "start", "goal"),
     frame_rate=20.0,  # as often as the planner: other instants would cost steps
     view=View(camera=(4.0, -7.5, 7.0), target=(4.5, 0.0, 0.0)),

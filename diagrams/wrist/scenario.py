@@ -1,6 +1,6 @@
 """The scenario of a wrist study: a scripted task through a wall that moves."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
@@ -45,6 +45,22 @@ class WristScenario(Scenario, WristSettings):
     arm: ArmParams = field(default_factory=ArmParams)
     instrument: InstrumentParams = field(default_factory=InstrumentParams)
     abdomen: AbdomenParams = field(default_factory=AbdomenParams)
+
+
+UNLIMITED = 1e3
+"""Force limit in N of the comparisons that cannot relax the wall."""
+
+
+def companions(scenario: WristScenario) -> dict[str, WristScenario]:
+    """The scenario in the other modes that it names, without a force limit.
+
+    A wrist that cannot relax the wall would stand still for ever.
+    """
+    wrist = replace(scenario.passive_wrist, force_limit=UNLIMITED)
+    return {
+        mode: replace(scenario, wrist=mode, compare=[], passive_wrist=wrist)
+        for mode in scenario.compare
+    }
 
 
 def check(scenario: WristScenario) -> None:

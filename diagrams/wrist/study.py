@@ -9,7 +9,7 @@ from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
 from diagrams.wrist.diagram import make_wrist_diagram
 from diagrams.wrist.plots import plots
-from diagrams.wrist.scenario import WristScenario, check
+from diagrams.wrist.scenario import WristScenario, check, companions
 
 XYZ = ("x", "y", "z")
 SIGNALS: dict[str, tuple[str, ...]] = WRIST_SIGNALS | {
@@ -28,7 +28,7 @@ def measure(run: Any) -> dict[str, Any]:
 STUDY = Study(
     name="wrist",
     scenario=WristScenario,
-    make_diagram=make_wrist_diagram,
+    make_diagram=lambda case: make_wrist_diagram(case.scenario),
     check=check,
     measure=measure,
     signals=SIGNALS,
@@ -37,6 +37,7 @@ STUDY = Study(
     decorate=decorate_wrist,
     controller="passive_wrist",
     adjust=stiffen,
+    companions=companions,
     required=("system", "duration", "wrist", "robot.p_WG", "robot.p_WP"),
     view=View(camera=(0.3, -0.42, 0.14), target=(0.0, 0.0, 0.0)),
 )

@@ -14,8 +14,8 @@ import tempfile
 import numpy as np
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
 from diagrams.gauze.scenes import Scene, scene
+from diagrams.studies import load_scenario
 from plants.surgeon.recording import save_recording
 
 MAX_TILT = 0.6

@@ -20,9 +20,9 @@ from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.common.run import Run, simulate, start
-from diagrams.common.scenario import load_scenario
-from diagrams.common.study import build, cenic
+from diagrams.common.study import cenic
 from diagrams.gauze.theatre import add_theatre
+from diagrams.studies import build, load_scenario
 from systems.common.compiled import rehearse
 from systems.common.stopwatch import STOPWATCH
 

@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator
 from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
 

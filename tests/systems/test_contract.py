@@ -11,8 +11,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem, PortDataType
 import pytest
 
-from diagrams.common.scenario import load_scenario
-from diagrams.common.study import STUDIES, build
+from diagrams.studies import STUDIES, build, load_scenario
 import plants
 import systems
 from systems.common.block import Block

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import load_scenario
 from tests.runs import run
 
 NAMES = ("crossed", "sweep", "blocked", "hunted", "crowded")
@@ -33,7 +34,7 @@ def test_crossed_is_passed_where_the_paper_stalls():
     assert figures["time_ratio"] <= 1.6
     stalled = run("gauze_crossed", *FIELD, "time_ratio=false")
     assert not stalled.metrics["reached"] and not stalled.metrics["contact"]
-    speed = np.linalg.norm(stalled.matrix("navigation.tool")[:, 6:9], axis=1)
+    speed = np.linalg.norm(stalled.navigation.tool.v, axis=1)
     assert stalled.metrics["final_tip_error"] > 0.02
     assert speed[-30:].max() < 0.01  # it stands there
     held = run("gauze_crossed", "behaviour=field", "time_ratio=false")
@@ -42,7 +43,7 @@ def test_crossed_is_passed_where_the_paper_stalls():
 
 def test_sweep_is_as_fast_as_it_says():
     r = run("gauze_sweep")
-    v_O = np.linalg.norm(r.matrix("obstacle.tip_velocity"), axis=1)
+    v_O = np.linalg.norm(r.obstacle.tip_velocity.v, axis=1)
     assert 0.05 < v_O.max() <= 0.075  # 10 mm/s are the tremor's own
     moving = v_O > 0.02
     arrival = r.metrics["time_to_target"]
@@ -55,19 +56,19 @@ def test_blocked_waits_at_a_free_pose_and_goes_on():
     assert r.metrics["waiting_time"] > 5.0
     time = r.signals["time"]
     rest = (time > 4.0) & (time < 5.9)
-    speed = np.linalg.norm(r.matrix("navigation.tool")[rest, 6:9], axis=1)
+    speed = np.linalg.norm(r.navigation.tool.v[rest], axis=1)
     assert speed.max() < 0.004
-    aim = r.matrix("planner.way")[rest, 2:5]
-    tip = r.matrix("robot.tool")[rest, 3:]
+    aim = r.planner.way.aim[rest]
+    tip = r.robot.tool.tip[rest]
     assert np.linalg.norm(aim - tip, axis=1).max() < 0.004
     assert r.metrics["time_to_target"] - 6.0 < 3.5
 
 
 def test_hunted_survives():
     r = run("gauze_hunted")
-    v_O = np.linalg.norm(r.matrix("obstacle.tip_velocity"), axis=1)
+    v_O = np.linalg.norm(r.obstacle.tip_velocity.v, axis=1)
     assert v_O.max() == pytest.approx(0.02)
-    assert r.matrix("clearance")[:, 0].min() < 0.004  # it was really chased
+    assert r.clearance.obstacle.min() < 0.004  # it was really chased
 
 
 def test_crowded_is_passed_where_the_paper_touches_or_stalls():

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from diagrams.common.run import run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.snake.plots import plots
+from diagrams.studies import load_scenario
 from tests import runs
 
 
