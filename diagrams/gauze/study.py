@@ -15,10 +15,11 @@ from diagrams.gauze.plots import plots
 from diagrams.gauze.scenario import GauzeScenario, check, companions
 from plants.abdomen.wall_force import FulcrumError
 from plants.arm.signals import Posture
-from plants.instruments.clearance import Clearances
+from plants.instruments.clearance import Gap
 from systems.auto_guidance.fuzzy_arbiter import Weights
 from systems.bypass.clearance_constraint import ClearanceStatus
 from systems.bypass.tool_bypass import Way
+from systems.common.signal import Many
 from systems.common.signals import (
     Estimate,
     Force,
@@ -53,7 +54,7 @@ SIGNALS = {
     "navigation.stop": StopCode,
     "joints.posture": Posture,
     "joints.status": Status,
-    "clearance": Clearances,
+    "clearance": Many(Gap, ("obstacle", "target", "camera")),
     "wall.force": Force,
     "wall.fulcrum_error": FulcrumError,
 }
