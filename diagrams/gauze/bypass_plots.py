@@ -20,7 +20,7 @@ def clearance(run: Any) -> Figure:
         ("target", "S (touched at the hand-over)"),
         ("camera", "endoscope"),
     ):
-        gap = getattr(run.clearance, who) * MM
+        gap = gap(run, who) * MM
         upper.plot(time, gap, color=COLORS[who], label=name)
     upper.axhline(0.0, color="k", lw=0.8)
     upper.set(ylabel="clearance [mm]", ylim=(-6.0, 40.0), xlim=(time[0], time[-1]))

@@ -72,7 +72,7 @@ def speeds(run: Any) -> Figure:
     upper.set(ylabel="speed of the tip [mm/s]", xlim=(0, time[-1]), ylim=(0, None))
     upper.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
-    gap = run.clearance.obstacle * MM
+    gap = gap(run, "obstacle") * MM
     error = np.linalg.norm(run.robot.tool.tip - run.target.shaft.tip, axis=1)
     lower.plot(time, gap, color=COLORS["obstacle"], label="clearance to O")
     lower.plot(time, error * MM, color=COLORS["target"], label="tip to S's tip")
@@ -106,7 +106,7 @@ def virtual_force(run: Any) -> Figure:
     """The geometry of the virtual force (Figure 5) where R came closest to O."""
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
-    index = int(run.clearance.obstacle.argmin())
+    index = int(gap(run, "obstacle").argmin())
     p_WP, p_WG = (p[index] * MM for p in (run.robot.tool.tip, run.robot.tool.fulcrum))
     p_WO = run.obstacle.shaft.tip[index] * MM
     p_WS = run.target.shaft.tip[index] * MM

@@ -68,7 +68,7 @@ def test_hunted_survives():
     r = run("gauze_hunted")
     v_O = np.linalg.norm(r.obstacle.tip_velocity.v, axis=1)
     assert v_O.max() == pytest.approx(0.02)
-    assert r.clearance.obstacle.min() < 0.004  # it was really chased
+    assert gap(r, "obstacle").min() < 0.004  # it was really chased
 
 
 def test_crowded_is_passed_where_the_paper_touches_or_stalls():

@@ -63,7 +63,7 @@ def test_static_surgeon_of_figure_7():
     r = paper("gauze_static")
     assert r.metrics["final_tip_error"] <= 0.002
     assert r.metrics["min_tool_clearance"] >= 0.005
-    gap = r.clearance.obstacle
+    gap = gap(r, "obstacle")
     speed = np.linalg.norm(r.navigation.tool.v, axis=1)
     full = r.scenario.go_to_target.max_speed
     border = int(np.argmax(gap < r.scenario.go_to_target.influence_distance))
@@ -90,7 +90,7 @@ def test_dynamic_surgeon_of_figure_8():
     drift = np.ptp(r.target.shaft.tip, axis=0)
     assert np.linalg.norm(drift) > 0.02
     # Near the obstacle faster than the field's own speed: it follows the obstacle.
-    near = (r.clearance.obstacle < 0.02) & (v_O > 0.01)
+    near = (gap(r, "obstacle") < 0.02) & (v_O > 0.01)
     faster = tip_speed(r, r.planner.v_R) - tip_speed(r, r.planner.v1)
     assert (faster[near] > 0.005).sum() * r.study.log_period > 0.2
     assert r.planner.weights.c3[near].max() > 0.7
@@ -158,7 +158,7 @@ def test_lost_sight_stops_and_goes_on():
             time < stop["start"] + stop["duration"] - 0.02
         )
         assert speed[still].max() == 0.0
-    assert r.clearance.obstacle.min() > 0.005
+    assert gap(r, "obstacle").min() > 0.005
 
 
 def test_same_seed_same_figures():
