@@ -7,7 +7,6 @@ from diagrams.gauze.kinematic_loop import estimate
 from diagrams.gauze.kinematic_planners import NO_CONE
 from systems.bypass import clearance_constraint, obstacle_tools, workspace
 from systems.bypass.clearance_constraint import (
-    TOOLS,
     ClearanceConstraint,
     ClearanceConstraintParams,
     constrain,
@@ -24,7 +23,7 @@ from systems.common.signals import Estimate
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
 ROOM = workspace.constants(ReachLimits(max_tilt=3.1), WorkspaceParams(floor=-0.5))[0]
-NOT_DODGING = np.zeros(TOOLS)
+NOT_DODGING = np.zeros(3)
 
 
 def tool(a, tip, v=(0.0, 0.0, 0.0)) -> ObstacleTool:
@@ -128,12 +127,18 @@ def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
     o = estimate((0.0, 0.05, -0.1), (0.0, 0.1, 0.0))
     s = estimate((0.05, 0.0, -0.1), (0.1, 0.0, 0.0))
     c = estimate((0.0, -0.05, -0.05), (0.0, -0.1, 0.0))
-    sure = [*map(read_tool, obstacle_tools.obstacle_tools(record, G, o, s, c))]
+
+    def around(*obstacles):
+        estimates = np.array([*map(flat, obstacles)])
+        tools = obstacle_tools.obstacle_tools(record, G, estimates, s, c)
+        return [*map(read_tool, tools)]
+
+    sure = around(o)
     assert len(sure) == 3
     assert sure[0].safe == Margins().safe_distance
     assert sure[2].safe == Margins().camera_distance
     o = o._replace(sigma_p=3e-4, sigma_v=0.01)
-    unsure = [*map(read_tool, obstacle_tools.obstacle_tools(record, G, o, s, c))]
+    unsure = around(o)
     extra = 3.0 * np.hypot(3e-4, 0.03 * 0.01)
     assert unsure[0].safe - sure[0].safe == pytest.approx(extra)
     # The final pose keeps the distance that is planned with from what is left of S.
@@ -159,7 +164,7 @@ def test_the_block_lets_pass_what_it_cannot_judge():
         port = dut.get_input_port(index)
         port.FixValue(context, dut.AllocateInputVector(port).value())
     lost = example(Estimate)._replace(known=0.0)
-    dut.GetInputPort("obstacle").FixValue(context, flat(lost))
+    dut.GetInputPort("obstacles").FixValue(context, flat(lost))
     wanted = [0.01, 0.02, 0.03]
     dut.GetInputPort("v_R").FixValue(context, wanted)
     np.testing.assert_allclose(dut.GetOutputPort("v_safe").Eval(context), wanted)

@@ -132,9 +132,9 @@ def test_the_block_runs_down_while_a_tool_is_lost():
     state = context.get_mutable_discrete_state_vector()
     state.SetFromVector(flat(State((0.05, 0.0, 0.0), -1.0 / 60.0, 0.0, 0.0, 0.0)))
     lost = example(Estimate)._replace(known=0.0)
-    dut.GetInputPort("obstacle").FixValue(context, flat(lost))
+    dut.GetInputPort("obstacles").FixValue(context, flat(lost))
     assert tip_speed(dut, context) == pytest.approx(0.05 - 1.0 / 60.0, abs=1e-9)
-    dut.GetInputPort("obstacle").FixValue(context, np.full(size(Estimate), np.nan))
+    dut.GetInputPort("obstacles").FixValue(context, np.full(size(Estimate), np.nan))
     for name in ("v1", "guide", "way"):
         assert np.isfinite(dut.GetOutputPort(name).Eval(context)).all()
 

@@ -44,7 +44,7 @@ def run(v_R, seconds=0.5, s=0.5, params=None, **changes):
     inputs = {
         "v_R": Velocity(tuple(v_R)),
         "guide": example(Guide)._replace(s=s),
-        "obstacle": example(Estimate),
+        "obstacles": example(Estimate),
         "target": TARGET,
         "view_cone": WIDE_CONE,
     }
@@ -123,8 +123,8 @@ def test_gauze_stays_in_the_view_cone():
     [
         ({}, Stop.MOVING),
         ({"target": TARGET._replace(known=0.0)}, Stop.TARGET_LOST),
-        ({"obstacle": TARGET._replace(known=0.0)}, Stop.OBSTACLE_LOST),
-        ({"obstacle": TARGET._replace(sigma_p=1.0)}, Stop.WAITING),
+        ({"obstacles": TARGET._replace(known=0.0)}, Stop.OBSTACLE_LOST),
+        ({"obstacles": TARGET._replace(sigma_p=1.0)}, Stop.WAITING),
         ({"guide": example(Guide)._replace(rho=math.nan)}, Stop.NOT_A_NUMBER),
         ({"target": TARGET._replace(p=(0.0, 0.0, -0.5))}, Stop.OUT_OF_REACH),
         ({"target": TARGET._replace(p=(0.2, 0.0, -0.1))}, Stop.OUT_OF_REACH),
