@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from diagrams.common.scenario import ScenarioError
+from diagrams.gauze.tools import gap
 from diagrams.studies import load_scenario
 from tests.runs import run
 
