@@ -15,7 +15,7 @@ from diagrams.resection.scenario import (
     new_session,
     reach_of,
 )
-from plants.tissue.volume import TUMOUR
+from plants.tissue.labels import TUMOUR
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import (
