@@ -1,7 +1,6 @@
 """The systems that scenarios can run, and scenarios loaded by their names."""
 
 from collections.abc import Sequence
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ from pydrake.common.yaml import yaml_dump, yaml_load_typed
 from diagrams.common.case import Case
 from diagrams.common.scenario import (
     ScenarioError,
+    files,
     find_scenario,
     nearest,
     refusals,
@@ -21,6 +21,7 @@ from diagrams.navigation.study import STUDY as NAVIGATION
 from diagrams.resection.study import STUDY as RESECTION
 from diagrams.snake.study import STUDY as SNAKE
 from diagrams.wrist.study import STUDY as WRIST
+from systems.common.parameter import check
 
 STUDIES = {study.name: study for study in (GAUZE, NAVIGATION, WRIST, SNAKE, RESECTION)}
 """A scenario's `system` and the study that runs it."""
@@ -63,8 +64,7 @@ def load_scenario(
         raise ScenarioError(f"{path}: missing key 'system', e.g. 'system: gauze'")
     study = get_study(tree["system"])
     schema = study.scenario
-    files = [f.name for f in dataclasses.fields(schema) if f.metadata.get("file")]
-    folders = dict.fromkeys(files, path.parent)
+    folders = dict.fromkeys(files(schema), path.parent)
     for text in overrides:
         folders[apply_override(tree, text)] = Path.cwd()
     if seed is not None:
@@ -74,7 +74,7 @@ def load_scenario(
     for key in study.required:
         require(tree, key, path)
     scenario = yaml_load_typed(schema=schema, data=yaml_dump(fit(schema, tree)))
-    for key in files:
+    for key in files(schema):
         if getattr(scenario, key):
             setattr(scenario, key, str(folders[key] / getattr(scenario, key)))
     check_scenario(scenario)
@@ -82,12 +82,9 @@ def load_scenario(
 
 
 def check_scenario(scenario: Any) -> None:
-    """Runs the common and the study's own checks; raises ScenarioError."""
-    if not scenario.duration > 0.0:
-        raise ScenarioError(f"duration={scenario.duration} s: expected > 0")
-    if scenario.seed < 0:
-        raise ScenarioError(f"seed={scenario.seed}: expected >= 0")
+    """Holds every value against its declaration, then the study's rules."""
     with refusals():
+        check(scenario, "")
         get_study(scenario.system).check(scenario)
 
 

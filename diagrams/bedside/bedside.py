@@ -16,6 +16,24 @@ from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
+from systems.common.parameter import parameter
+
+
+@dataclass
+class ToolAtStart:
+    """Where the robot's own tool R is at the start, in W."""
+
+    p_WG: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "its true fulcrum G_R, the wall at rest",
+        "m",
+        least=-0.5,
+        most=0.5,
+        shape=(3,),
+    )
+    p_WP: list[float] = parameter(
+        [0.0, 0.0, -0.1], "its tip", "m", least=-0.5, most=0.5, shape=(3,)
+    )
 
 
 @dataclass

@@ -17,6 +17,7 @@ examples:
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
+  trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
 """
 
@@ -57,6 +58,16 @@ def make_parser() -> argparse.ArgumentParser:
     draw.add_argument(
         "--out", metavar="FILE", type=Path, help="SVG or PNG; default: out/NAME.svg"
     )
+    keys = commands.add_parser(
+        "keys",
+        help="list a scenario's keys with value, unit, bounds and meaning",
+        description="Lists what `--set` can change in a scenario.",
+    )
+    keys.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    keys.add_argument(
+        "pattern", metavar="PATTERN", nargs="?", default="", help="part of the key"
+    )
+    keys.add_argument("--json", action="store_true", help="for programs")
     resect = commands.add_parser(
         "resect",
         help="plan a resection by hand, line by line",
@@ -73,12 +84,13 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def list_scenarios() -> None:
-    """Prints every scenario's name and description."""
+def list_scenarios(arguments: argparse.Namespace) -> int:
+    """Runs `trocar scenarios`: every scenario's name and description."""
     files = scenario_files()
     width = max(map(len, files), default=0)
     for name, path in files.items():
         print(f"{name:<{width}}  {read_tree(path).get('description', '')}")
+    return 0
 
 
 def default_name(name: str) -> str:
@@ -122,6 +134,16 @@ def diagram_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def keys_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar keys`."""
+    from diagrams.common.keys import as_json, as_text, matching
+    from diagrams.studies import load_scenario
+
+    found = matching(load_scenario(arguments.name), arguments.pattern)
+    print(as_json(found) if arguments.json else as_text(found))
+    return 0
+
+
 def resect_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar resect`."""
     from diagrams.resection.console import run_console
@@ -136,6 +158,15 @@ def resect_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+COMMANDS = {
+    "scenarios": list_scenarios,
+    "run": run_command,
+    "diagram": diagram_command,
+    "keys": keys_command,
+    "resect": resect_command,
+}
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
@@ -146,14 +177,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("drake").setLevel(logging.WARNING)
     arguments = make_parser().parse_args(argv)
     try:
-        if arguments.command == "run":
-            return run_command(arguments)
-        if arguments.command == "diagram":
-            return diagram_command(arguments)
-        if arguments.command == "resect":
-            return resect_command(arguments)
-        list_scenarios()
-        return 0
+        return COMMANDS[arguments.command](arguments)
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
         return 2

@@ -19,7 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common import metrics, replay
 from diagrams.common.case import Case
-from diagrams.common.log import add_log, columns, logged_ports, read_log, save_signals
+from diagrams.common.log import add_log, named, read_log, save_signals
 from diagrams.common.plots import save_figure
 from diagrams.common.progress import Progress, Show, progress_of, silent
 from diagrams.common.scenario import ScenarioError, refusals, save_scenario
@@ -40,6 +40,7 @@ class Run:
         case: What ran.
         study: The system that ran it.
         diagram: The root diagram; the study's own is its subsystem "station".
+        logged: Ports that were logged, and their signals.
         signals: Column name to samples; "time" [s] is the common clock.
         wall_time: Wall seconds of the advance alone.
         simulated: Simulated seconds reached.
@@ -54,6 +55,7 @@ class Run:
     case: Case
     study: Study
     diagram: Any
+    logged: dict[str, Any] = field(default_factory=dict)
     signals: dict[str, np.ndarray] = field(default_factory=dict)
     wall_time: float = 0.0
     simulated: float = 0.0
@@ -69,9 +71,11 @@ class Run:
         """What ran, as it was written."""
         return self.case.scenario
 
-    def matrix(self, name: str) -> np.ndarray:
-        """All columns of one port, shape (samples, columns)."""
-        return np.column_stack([self.signals[c] for c in columns(self.study, name)])
+    def __getattr__(self, name: str) -> Any:
+        """What was logged below a name: `run.planner.guide.rho` is an array (n)."""
+        if name.startswith("_"):  # asked for by who copies it
+            raise AttributeError(name)
+        return named(self.logged, self.signals, name)
 
 
 def start(diagram: Any, config: SimulatorConfig, context: Any = None) -> Simulator:
@@ -144,26 +148,19 @@ def simulate_diagram(
     study = get_study(case.scenario.system)
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
-    ports = logged_ports(station, study)
-    sink = add_log(builder, station, ports, study.log_period)
+    logged = study.signals(case.scenario)
+    sink = add_log(builder, station, logged, study.log_period)
     duration = study.length(case)
     speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
-    config = study.integrator(scenario)
+    config = study.integrator(case.scenario)
     simulator = start(root, config)
     context = simulator.get_mutable_context()
-    root.SetRandomContext(context, RandomGenerator(scenario.seed))
-    run = Run(scenario, study, root, duration=duration, replay_speed=speed)
+    root.SetRandomContext(context, RandomGenerator(case.scenario.seed))
+    run = Run(case, study, root, logged, duration=duration, replay_speed=speed)
     first = start(root, config, context.Clone())
     rehearse(lambda: first.AdvanceTo(1.5 * study.log_period))
-    simulator = Simulator(root)
-    config = study.integrator(case.scenario)
-    ApplySimulatorConfig(config, simulator)
-    context = simulator.get_mutable_context()
-    root.SetRandomContext(context, RandomGenerator(case.scenario.seed))
-    run = Run(case, study, root, duration=duration, replay_speed=speed)
-    rehearse(root, context, config, 1.5 * study.log_period)
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
@@ -180,7 +177,7 @@ def simulate_diagram(
         study.keep(case, station, context, True)
     except OSError as error:
         run.error = run.error or f"what was done could not be saved: {error}"
-    run.signals = read_log(sink, study, ports, context)
+    run.signals = read_log(sink, logged, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
     if len(run.signals["time"]) > 1:

@@ -11,6 +11,8 @@ from typing import Any
 
 from pydrake.common.yaml import yaml_dump_typed
 
+from systems.common.parameter import parameter
+
 SCENARIO_FOLDERS = Path(__file__).parents[1]
 """Scenarios lie in `diagrams/*/scenarios/*.yaml`; a file's stem is its name."""
 
@@ -34,20 +36,19 @@ def refusals() -> Iterator[None]:
 class Scenario:
     """What every scenario has. A study's own dataclass adds its fields.
 
-    A field with `metadata={"file": True}` names a file: relative names are
-    taken from the scenario's folder, and a run keeps a copy beside its results.
-
-    Attributes:
-        system: The study that runs it, a key of `diagrams.studies.STUDIES`.
-        description: One line for `trocar scenarios`.
-        duration: Simulated time [s].
-        seed: Seed of all randomness of the run.
+    Fields are declared as parameters (`systems.common.parameter`).
     """
 
-    system: str = ""
-    description: str = ""
-    duration: float = 10.0
-    seed: int = 0
+    system: str = parameter("", "the study that runs it")
+    description: str = parameter("", "one line for `trocar scenarios`")
+    duration: float = parameter(10.0, "simulated time", "s", above=0.0, most=1e5)
+    seed: int = parameter(0, "of all randomness of the run", least=0, most=2**63 - 1)
+
+
+def files(scenario: Any) -> list[str]:
+    """Names of a scenario's fields, or its class's, that name files."""
+    told = {f.name: f.metadata.get("parameter") for f in dataclasses.fields(scenario)}
+    return [name for name, parameter in told.items() if parameter and parameter.file]
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
@@ -89,13 +90,13 @@ def save_scenario(scenario: Any, folder: Path) -> Path:
         The file; loading it repeats the run.
     """
     copy = dataclasses.replace(scenario)
-    for field in dataclasses.fields(copy):
-        name = getattr(copy, field.name)
-        if field.metadata.get("file") and name:
+    for field in files(copy):
+        name = getattr(copy, field)
+        if name:
             target = folder / Path(name).name
             if target.resolve() != Path(name).resolve():
                 shutil.copyfile(name, target)
-            setattr(copy, field.name, target.name)
+            setattr(copy, field, target.name)
     path = folder / "scenario.yaml"
     path.write_text(yaml_dump_typed(copy))
     return path

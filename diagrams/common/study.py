@@ -46,9 +46,7 @@ class Study:
             is shown in Meshcat.
         check: Raises ScenarioError for a scenario that cannot run.
         measure: The figures of a finished run, flat and in SI units.
-        signals: Exported ports to log: port name to column names. A
-            one-element port's column is the port's name itself.
-        optional: Those of the signals that only some scenarios' diagrams export.
+        signals: Exported ports to log for a scenario, and their signals.
         log_period: Period of the log [s], on the control clock.
         plots: Makes the figures of a run, by file name without ending.
         decorate: Adds trails, arrows and the like to a recording.
@@ -75,12 +73,11 @@ class Study:
     make_diagram: Callable[[Any], Any]
     check: Callable[[Any], None]
     measure: Callable[[Any], dict[str, Any]]
-    signals: dict[str, tuple[str, ...]]
+    signals: Callable[[Any], dict[str, Any]]
     log_period: float
     plots: Callable[[Any], dict[str, Any]]
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
-    optional: frozenset[str] = frozenset()
     adjust: Callable[[Any, Any, Any], None] = lambda case, station, context: None
     keep: Callable[[Any, Any, Any, bool], None] = lambda *now: None
     required: tuple[str, ...] = ("system", "duration")

@@ -21,23 +21,23 @@ def bypass_figures(
         tip_error: Distance of R's tip from S's (n) [m].
     """
     time = run.signals["time"]
-    status = run.matrix("planner.clearance")
-    near = status[:, 1] > 0.5
-    held = status[near, 2] > 0.5
+    status = run.planner.clearance
+    near = status.near > 0.5
+    held = status.condition[near] > 0.5
     approach = tip_error > HAND_OVER
-    to_target = run.matrix("clearance")[approach, 1]
+    to_target = run.clearance.target[approach]
     figures = {
         "evasion_condition_held": float(held.mean()) if near.any() else 1.0,
-        "dodging_time": float(np.mean(status[:, 3]) * time[-1]),
+        "dodging_time": float(np.mean(status.dodge) * time[-1]),
         "target_touched_before_hand_over": bool((to_target <= 0.0).any()),
         "edge_switches": 0,
         "waiting_time": 0.0,
         "time_ratio": None,
     }
-    if "planner.way.waiting" in run.signals:
-        way = run.matrix("planner.way")
-        figures["edge_switches"] = round(way[-1, 5])
-        figures["waiting_time"] = float(np.mean(way[:, 1] > 0.0) * time[-1])
+    if "planner.way" in run.logged:
+        way = run.planner.way
+        figures["edge_switches"] = round(way.switches[-1])
+        figures["waiting_time"] = float(np.mean(way.waiting > 0.0) * time[-1])
     if WITHOUT_OBSTACLE in run.case.companions and arrival:
         alone = run.case.companions[WITHOUT_OBSTACLE].metrics.get("time_to_target")
         figures["time_ratio"] = arrival / alone if alone else None

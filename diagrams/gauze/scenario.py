@@ -1,10 +1,11 @@
 """The scenario of a gauze delivery: every block's and part's parameters."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 import math
 
+from diagrams.bedside.bedside import ToolAtStart
 from diagrams.bedside.wrist import WristSettings, check_wrist
-from diagrams.common.scenario import Scenario, ScenarioError, nearest
+from diagrams.common.scenario import Scenario, ScenarioError
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
@@ -20,6 +21,7 @@ from systems.bypass.obstacle_tools import Margins
 from systems.bypass.tool_bypass import ToolBypassParams
 from systems.bypass.workspace import WorkspaceParams
 from systems.common.geometry import sub, unit
+from systems.common.parameter import parameter, part
 from systems.common.signal import vector
 from systems.common.signals import ViewCone
 from systems.motion.endoscope import EndoscopeParams
@@ -33,78 +35,55 @@ from systems.motion.tool_navigation import (
 from systems.sensing.optical_tracker import OpticalTrackerParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
-
-@dataclass
-class RobotTool:
-    """Where the robot's own tool R is at the start, in W [m].
-
-    Attributes:
-        p_WG: Its fulcrum G_R, here known to the robot.
-        p_WP: Its tip.
-    """
-
-    p_WG: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    p_WP: list[float] = field(default_factory=lambda: [0.0, 0.0, -0.1])
+BEHAVIOURS = ("bypass", "field")
+"""Attract or bypass, or the paper's sum of potentials (see `go_to_target.form`)."""
 
 
 @dataclass
 class GauzeScenario(Scenario, WristSettings):
-    """Auto-guided movements (section 5 of the paper): gauze to the surgeon.
+    """Auto-guided movements (section 5 of the paper): gauze to the surgeon."""
 
-    Attributes:
-        recording: CSV `t, x, y, z` of O's tip in W, in s and m; it takes the
-            place of O's waypoints.
-        known_fulcrums: Whether the estimators are told G_S and G_O, for
-            comparison; else they find them from the shafts' lines.
-        behaviour: Form of "go to target": "bypass" (attract or bypass), or "field"
-            (the paper's sum of potentials, see `go_to_target.form`).
-        time_ratio: Whether it is run without O as well, to give the figure
-            `time_ratio`.
-        hunt: O chases the robot's shaft, if its speed is not 0.
-        measure_from: Force figures of the wrist start here [s].
-    """
-
-    recording: str = field(default="", metadata={"file": True})
-    known_fulcrums: bool = False
-    behaviour: str = "bypass"
-    measure_from: float = 0.0
-    robot: RobotTool = field(default_factory=RobotTool)
-    target: SurgeonToolParams = field(default_factory=SurgeonToolParams)
-    obstacle: SurgeonToolParams = field(default_factory=SurgeonToolParams)
-    time_ratio: bool = False
-    hunt: Hunt = field(default_factory=Hunt)
-    camera: EndoscopeParams = field(default_factory=EndoscopeParams)
-    tracker: OpticalTrackerParams = field(default_factory=OpticalTrackerParams)
-    estimator: TrajectoryEstimatorParams = field(
-        default_factory=TrajectoryEstimatorParams
+    recording: str = parameter(
+        "",
+        "CSV t, x, y, z of O's tip in W, s and m, in place of its waypoints",
+        file=True,
     )
-    margins: Margins = field(default_factory=Margins)
-    workspace: WorkspaceParams = field(default_factory=WorkspaceParams)
-    tool_bypass: ToolBypassParams = field(default_factory=ToolBypassParams)
-    clearance_constraint: ClearanceConstraintParams = field(
-        default_factory=ClearanceConstraintParams
+    known_fulcrums: bool = parameter(
+        False, "whether the estimators are told G_S and G_O, for comparison"
     )
-    go_to_target: GoToTargetParams = field(default_factory=GoToTargetParams)
-    velocity_corrections: VelocityCorrectionsParams = field(
-        default_factory=VelocityCorrectionsParams
+    behaviour: str = parameter("bypass", 'form of "go to target"', choices=BEHAVIOURS)
+    measure_from: float = parameter(
+        0.0, "force figures of the wrist start here", "s", least=0.0, most=1e5
     )
-    backward_movement: BackwardMovementParams = field(
-        default_factory=BackwardMovementParams
+    robot: ToolAtStart = part(ToolAtStart)
+    target: SurgeonToolParams = part(SurgeonToolParams)
+    obstacle: SurgeonToolParams = part(SurgeonToolParams)
+    time_ratio: bool = parameter(
+        False, "whether it is run without O as well, for the figure `time_ratio`"
     )
-    fuzzy_arbiter: FuzzyArbiterParams = field(default_factory=FuzzyArbiterParams)
-    navigation: ToolNavigationParams = field(default_factory=ToolNavigationParams)
-    joints: JointCommandsParams = field(default_factory=JointCommandsParams)
-    arm: ArmParams = field(default_factory=ArmParams)
-    instrument: InstrumentParams = field(default_factory=InstrumentParams)
-    abdomen: AbdomenParams = field(default_factory=AbdomenParams)
+    hunt: Hunt = part(Hunt)
+    camera: EndoscopeParams = part(EndoscopeParams)
+    tracker: OpticalTrackerParams = part(OpticalTrackerParams)
+    estimator: TrajectoryEstimatorParams = part(TrajectoryEstimatorParams)
+    margins: Margins = part(Margins)
+    workspace: WorkspaceParams = part(WorkspaceParams)
+    tool_bypass: ToolBypassParams = part(ToolBypassParams)
+    clearance_constraint: ClearanceConstraintParams = part(ClearanceConstraintParams)
+    go_to_target: GoToTargetParams = part(GoToTargetParams)
+    velocity_corrections: VelocityCorrectionsParams = part(VelocityCorrectionsParams)
+    backward_movement: BackwardMovementParams = part(BackwardMovementParams)
+    fuzzy_arbiter: FuzzyArbiterParams = part(FuzzyArbiterParams)
+    navigation: ToolNavigationParams = part(ToolNavigationParams)
+    joints: JointCommandsParams = part(JointCommandsParams)
+    arm: ArmParams = part(ArmParams)
+    instrument: InstrumentParams = part(InstrumentParams)
+    abdomen: AbdomenParams = part(AbdomenParams)
 
     @property
     def emulated(self) -> bool:
         """Whether the passive wrist is in the diagram: its fulcrum is not given."""
         return self.wrist != "known" or not self.wall_motion.still
 
-
-BEHAVIOURS = ("bypass", "field")
 
 LEAST_FULCRUM_DISTANCE = 0.02
 """Two trocars cannot be closer [m]."""
@@ -136,12 +115,6 @@ def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
 
 def check(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    for part in vars(scenario).values():
-        if hasattr(part, "check"):
-            part.check()
-    if scenario.behaviour not in BEHAVIOURS:
-        hint = nearest(scenario.behaviour, BEHAVIOURS)
-        raise ScenarioError(f"behaviour={scenario.behaviour!r}: {hint}")
     if scenario.hunt.speed and scenario.recording:
         raise ScenarioError(
             f"hunt.speed={scenario.hunt.speed}: expected 0 together with a recording"
@@ -149,14 +122,6 @@ def check(scenario: GauzeScenario) -> None:
     check_wrist(scenario)
     if scenario.recording:
         load_recording(scenario.recording)
-    points = {
-        "robot.p_WG": scenario.robot.p_WG,
-        "robot.p_WP": scenario.robot.p_WP,
-        "camera.p_WG": scenario.camera.p_WG,
-    }
-    for name, point in points.items():
-        if len(point) != 3:
-            raise ScenarioError(f"{name}={point}: expected 3 numbers")
     _check_fulcrums(scenario)
     _check_reach(scenario)
 

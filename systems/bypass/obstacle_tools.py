@@ -37,7 +37,7 @@ class Margins:
 
     safe_distance: float = parameter(
         0.007,
-        "D_safe, that is held",
+        "D_safe, that the clearance constraint holds",
         "m",
         least=0.005,
         most=0.03,
@@ -59,7 +59,7 @@ class Margins:
     avoid_camera: bool = parameter(True, "whether the endoscope is one")
     sigmas: float = parameter(
         3.0,
-        "of an estimate's standard deviations that are added",
+        "standard deviations of an estimate that are added",
         "1",
         least=0.0,
         most=10.0,

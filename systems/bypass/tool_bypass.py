@@ -100,13 +100,13 @@ class ToolBypassParams:
     )
     switch_ratio: float = parameter(
         0.85,
-        "another edge is taken if shorter than this part",
+        "another edge is taken if it is shorter than this part",
         above=0.0,
         most=1.0,
     )
     switch_gain: float = parameter(
         0.005,
-        "of the one in use, and by this as well",
+        "of the one in use, and shorter by this as well",
         "m",
         least=0.0,
         most=0.1,

@@ -211,11 +211,7 @@ GO_ON = {
 what it cannot judge, and a camera out of sight is no obstacle."""
 FAIL = {
     *("ArcNavigation.fulcrum", "ArcNavigation.permission"),
-    *("ClassicalPlanner.robot", "ClassicalPlanner.seen", "ClassicalPlanner.goal"),
     "PassiveWristEmulation.estimate",
-    *("StatechartPlanner.robot", "StatechartPlanner.seen", "StatechartPlanner.goal"),
-    *("SwitchingPlanner.robot", "SwitchingPlanner.seen", "SwitchingPlanner.goal"),
-    *("UnicycleControl.robot", "UnicycleControl.v_R", "UnicycleControl.mode"),
     *("WireForwardActuation.lengths", "WireForwardActuation.rates"),
     "WireInverseActuation.posture",
 }

@@ -17,6 +17,7 @@ from plants.tissue.execution import Execution, load_execution, save_execution
 from systems.common.archive import beside
 from systems.resection.planning.reach import load_reach
 from systems.resection.planning.session import load_session
+from tests import runs
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +94,7 @@ def test_a_diagram_needs_no_plan(paper, monkeypatch):
 
 
 def test_refused():
-    run = simulate(load_scenario("resect_refused"))
+    run = runs.run("resect_refused")
     m = run.metrics
     assert [refusal["reason"] for refusal in m["refusals"]] == [
         "tool outside",
@@ -126,7 +127,7 @@ def test_auto_resumes_after_being_killed(tmp_path):
 
 
 def test_auto_small():
-    run = simulate(load_scenario("resect_auto_small"))
+    run = runs.run("resect_auto_small")
     m = run.metrics
     assert not run.error and run.simulated < 1200.0
     assert m["reachable_fraction"] >= 0.80

@@ -1,27 +1,17 @@
 """The wrist's scenarios must show the issue's figures, with the arm in the loop."""
 
 from dataclasses import replace
-import functools
-import json
 
 import numpy as np
 import pytest
 
 from diagrams.bedside.wrist_metrics import last_above, settled
 from diagrams.common.case import Case
-from diagrams.common.run import Run, prepare, simulate
+from diagrams.common.run import prepare, simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.studies import load_scenario
 from diagrams.wrist.plots import plots
-
-
-@functools.cache
-def run(name: str, *overrides: str) -> Run:
-    """One run of each scenario serves all tests; nothing is run beside it."""
-    result = simulate(Case(load_scenario(name, overrides)))
-    assert not result.error
-    json.dumps(result.metrics, allow_nan=False)
-    return result
+from tests.runs import run
 
 
 def test_arcs_about_a_wrong_guess():
@@ -70,7 +60,7 @@ def test_known_fulcrum_under_breathing():
 
 def test_off_stands_still_for_the_wall_is_loaded():
     result = run("pwe_arc", "wrist=off")
-    tip = result.matrix("robot.tool")[:, 3:]
+    tip = result.robot.tool.tip
     assert result.metrics["max_lateral_force"] > 5.0
     assert np.ptp(tip[-600:], axis=0).max() < 1e-4
     assert result.metrics["time_frozen"] > 10.0
@@ -79,10 +69,10 @@ def test_off_stands_still_for_the_wall_is_loaded():
 def test_a_lost_sensor_stops_the_task_until_it_is_back():
     overrides = ["tool_wrench.lost=[7.0, 8.0]"]
     result = simulate(Case(load_scenario("pwe_arc", overrides, duration=10.0)))
-    t, code = result.signals["time"], result.signals["wrist.permission.code"]
+    t, code = result.signals["time"], result.wrist.permission.code
     assert np.all(code[(t > 7.1) & (t < 8.0)] == 9.0)
     assert np.all(code[t > 8.4] == 0.0)
-    tip = result.matrix("robot.tool")[:, 3:]
+    tip = result.robot.tool.tip
     still = (t > 7.3) & (t < 8.0)
     assert np.ptp(tip[still], axis=0).max() < 2e-4
     assert np.ptp(tip[t > 8.5], axis=0).max() > 5e-3
@@ -102,8 +92,7 @@ def test_same_seed_same_figures():
     one, two = (
         simulate(Case(load_scenario("pwe_breathing", duration=1.0))) for _ in range(2)
     )
-    name = "wrist.fulcrum"
-    np.testing.assert_array_equal(one.matrix(name), two.matrix(name))
+    np.testing.assert_array_equal(one.wrist.fulcrum.p, two.wrist.fulcrum.p)
 
 
 @pytest.mark.parametrize(
