@@ -28,6 +28,8 @@ def _taken(signal: Any, array: str) -> str:
 def _given(signal: Any, value: str, first: int) -> list[str]:
     if isinstance(signal, int):
         return [f"array[{first}:{first + signal}] = {value}"]
+    if isinstance(signal, Many):
+        return [f"array[{first}:{first + size(signal)}] = {value}.ravel()"]
     parts = enumerate(elements(signal, value), first)
     return [f"array[{i}] = {part}" for i, part in parts]
 
