@@ -140,7 +140,7 @@ EXPORTS = {
 
 def tool_exports(scenario: GauzeScenario) -> dict[str, str]:
     """The tools' share of what can be logged: `NAME.shaft`, `NAME.estimate`, ..."""
-    exports = {}
+    exports: dict[str, str] = {}
     for name in hands(scenario.tools, scenario.seed):
         exports |= {
             f"{name}.shaft": f"{name}_tool.shaft",

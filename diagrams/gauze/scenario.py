@@ -120,7 +120,10 @@ def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
     """The scenario with O withdrawn to its trocar, if `time_ratio` asks for it."""
     if not scenario.time_ratio:
         return {}
-    tools = [withdrawn(t) if t.role == OBSTACLE else t for t in scenario.tools]
+    tools = [
+        withdrawn(t) if isinstance(t, HandTool) and t.role == OBSTACLE else t
+        for t in scenario.tools
+    ]
     return {WITHOUT_OBSTACLE: replace(scenario, tools=tools, time_ratio=False)}
 
 
@@ -128,8 +131,9 @@ def withdrawn(tool: HandTool) -> HandTool:
     """A tool that stays just inside its trocar."""
     x, y, z = tool.p_WG
     inside = [[x, y, z - WITHDRAWN]]
-    still = {"times": [0.0], "points": inside, "recording": None, "pushes": []}
-    return replace(tool, hunt=Hunt(), **still)
+    return replace(
+        tool, times=[0.0], points=inside, recording=None, pushes=[], hunt=Hunt()
+    )
 
 
 def check(scenario: GauzeScenario) -> None:

@@ -96,5 +96,6 @@ class Perception(StepBlock):
             perceive,
             [packed(params)],
             {"robot": RobotState, "obstacles": OBSTACLES, "noise": NOISE},
-            {"seen": SEEN},
+            "seen",
+            SEEN,
         )
