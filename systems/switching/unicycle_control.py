@@ -113,5 +113,6 @@ class UnicycleControl(StepBlock):
             _control,
             [constants(params or UnicycleControlParams())],
             {"robot": RobotState, "v_R": PlanarVelocity, "mode": Mode},
-            {"command": Command},
+            "command",
+            Command,
         )
