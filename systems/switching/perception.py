@@ -13,14 +13,13 @@ from plants.crowd.signals import OBSTACLES, Obstacle
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
-from systems.common.signal import finiteness, reader, size, writer
+from systems.common.signal import finiteness, reader, size
 from systems.common.step_block import StepBlock
 from systems.switching.signals import NOISE, SEEN, Noise, Seen
 
 SEEN_SIZE = size(Seen)
 read_obstacle = reader(Obstacle)
 read_noise = reader(Noise)
-write_seen = writer(Seen)
 finite_obstacle = finiteness(Obstacle)
 
 
@@ -68,7 +67,7 @@ def perceive(
             x, y = o.x + s * e.x, o.y + s * e.y
             v_x, v_y = o.v_x + w * e.v_x, o.v_y + w * e.v_y
             row = Seen(float(track), x, y, o.radius, v_x, v_y)
-        write_seen(seen[track], row)
+        seen[track, :] = row
     return (seen,)
 
 
