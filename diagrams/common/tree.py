@@ -105,9 +105,13 @@ def require(tree: dict[str, Any], key: str, path: Path) -> None:
     """Raises a ScenarioError unless the dotted key stands in the tree."""
     node: Any = tree
     for part in key.split("."):
-        if not isinstance(node, dict) or part not in node:
+        named = {tool["name"]: tool for tool in tree.get("tools", ())}
+        if part not in node and node is tree and part in named:
+            node = named[part]
+        elif isinstance(node, dict) and part in node:
+            node = node[part]
+        else:
             raise ScenarioError(f"{path}: missing key {key!r}")
-        node = node[part]
 
 
 def fit(schema: Any, value: Any, path: str = "") -> Any:
@@ -131,10 +135,10 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
     def refuse(expected: str) -> typing.NoReturn:
         raise ScenarioError(f"{path}={value!r}: expected {expected}")
 
+    schema = getattr(schema, "__value__", schema)
     origin = typing.get_origin(schema)
     if isinstance(schema, types.UnionType) or origin is typing.Union:
-        members = [m for m in typing.get_args(schema) if m is not type(None)]
-        return None if value is None else fit(members[0], value, path)
+        return None if value is None else fit(member(schema, value), value, path)
     if dataclasses.is_dataclass(schema):
         if not isinstance(value, dict):
             refuse("keys and values")
@@ -152,7 +156,7 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
         if not isinstance(value, list):
             refuse("a list, e.g. [0.0, 0.0, 0.1]")
         kind = typing.get_args(schema)[0]
-        return [fit(kind, item, f"{path}[{i}]") for i, item in enumerate(value)]
+        return [fit(kind, item, place(path, i, item)) for i, item in enumerate(value)]
     if origin is dict:
         if not isinstance(value, dict):
             refuse("keys and values")
@@ -166,6 +170,70 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
         names = {int: "a whole number", bool: "true or false", str: "a text"}
         refuse(names[schema])
     return value
+
+
+def place(path: str, index: int, item: Any) -> str:
+    """The key of a list's item; a tool is called by its name alone."""
+    named = path == "tools" and isinstance(item, dict) and item.get("name")
+    return str(named) if named else f"{path}[{index}]"
+
+
+def member(schema: Any, value: Any) -> Any:
+    """The one of several types that a value is of: by its `role`, or the first.
+
+    Raises:
+        ScenarioError: If none has the role.
+    """
+    members = [m for m in typing.get_args(schema) if m is not type(None)]
+    if len(members) == 1 or not isinstance(value, dict):
+        return members[0]
+    roles = {role: m for m in members for role in _roles(m)}
+    role = value.get("role", next(iter(_roles(members[0])), ""))
+    if role not in roles:
+        raise ScenarioError(f"role={role!r}: {nearest(str(role), roles)}")
+    return roles[role]
+
+
+def _roles(schema: Any) -> tuple[str, ...]:
+    told = {f.name: f.metadata for f in dataclasses.fields(schema)}
+    choices: tuple[str, ...] = told["role"]["parameter"].choices
+    return choices
+
+
+def make(schema: Any, value: Any) -> Any:
+    """The dataclass of plain data that fit it."""
+    schema = getattr(schema, "__value__", schema)
+    origin = typing.get_origin(schema)
+    if isinstance(schema, types.UnionType) or origin is typing.Union:
+        return None if value is None else make(member(schema, value), value)
+    if dataclasses.is_dataclass(schema):
+        kinds = typing.get_type_hints(schema)
+        made = {key: make(kinds[key], item) for key, item in value.items()}
+        return typing.cast(typing.Callable[..., Any], schema)(**made)
+    if origin is list:
+        return [make(typing.get_args(schema)[0], item) for item in value]
+    if origin is dict:
+        kind = typing.get_args(schema)[1]
+        return {key: make(kind, item) for key, item in value.items()}
+    return float(value) if schema is float else value
+
+
+def settle(schema: Any, value: Any, folder: Path) -> None:
+    """Makes the names of files in plain data absolute, taken from a folder."""
+    schema = getattr(schema, "__value__", schema)
+    if isinstance(schema, types.UnionType) and value is not None:
+        schema = member(schema, value)
+    if isinstance(value, list) and typing.get_origin(schema) is list:
+        for item in value:
+            settle(typing.get_args(schema)[0], item, folder)
+    if not isinstance(value, dict) or not dataclasses.is_dataclass(schema):
+        return
+    kinds = typing.get_type_hints(schema)
+    for field in dataclasses.fields(schema):
+        item, told = value.get(field.name), field.metadata.get("parameter")
+        if told and told.file and isinstance(item, str) and item:
+            value[field.name] = str(folder / item)
+        settle(kinds[field.name], item, folder)
 
 
 def _number(value: Any, refuse: typing.Callable[[str], typing.NoReturn]) -> float | int:

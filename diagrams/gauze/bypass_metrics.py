@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.gauze.scenario import WITHOUT_OBSTACLE
+from diagrams.gauze.tools import gap
 
 HAND_OVER = 0.02
 """The robot hands over while its tip is this near to S's tip; S may be touched [m]."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
+from diagrams.gauze.tools import gap, logged
 from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
@@ -55,7 +56,7 @@ def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     time = run.signals["time"]
     tip = run.robot.tool.tip
-    tip_error = np.linalg.norm(tip - run.target.shaft.tip, axis=1)
+    tip_error = np.linalg.norm(tip - logged(run, run.scenario.target).shaft.tip, axis=1)
     force = np.linalg.norm(run.wall.force.f, axis=1)
     arrival = time_to_target(time, tip_error)
     touched = bool(gap(run, "obstacle").min() <= 0.0)
@@ -71,7 +72,9 @@ def measure(run: Any) -> dict[str, Any]:
         "max_lateral_force": float(force.max()),
         "rms_lateral_force": float(np.sqrt(np.mean(force**2))),
         "max_fulcrum_error": float(run.wall.fulcrum_error.distance.max()),
-        "time_in_view": float(in_cone(tip, run.camera.view_cone).mean()),
+        "time_in_view": float(
+            in_cone(tip, logged(run, run.scenario.camera).view_cone).mean()
+        ),
         "max_speed": float(speed.max()),
         "joint_limit_time": float(np.mean(run.joints.status.code) * time[-1]),
         "stops": stops(time, run.navigation.stop.code),

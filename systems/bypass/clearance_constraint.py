@@ -108,13 +108,13 @@ class ClearanceConstraintParams:
         1.0, "omega_max of the shaft", "rad/s", above=0.0, most=10.0
     )
     rate: float = parameter(
-        4.0, "gamma; at most a_max / (v_max + V_O)", "1/s", above=0.0, most=60.0
+        4.0, "gamma; at most a_max / (v_max + V_O)", "1/s", least=0.1, most=60.0
     )
     obstacle_speed: float = parameter(
         0.06,
         "V_O to be reckoned with: within D_safe + V_O / gamma a tool counts as near",
         "m/s",
-        above=0.0,
+        least=0.01,
         most=0.5,
     )
     dodge: bool = parameter(True, "whether to dodge")

@@ -147,9 +147,12 @@ def check(params: Any, owner: str | None = None) -> None:
 
 
 def _dataclasses(key: str, value: Any) -> list[tuple[str, Any]]:
+    """What is in a field, by its key; a tool is called by its name alone."""
     items = [(key, value)]
     if isinstance(value, list):
         items = [(f"{key}[{index}]", item) for index, item in enumerate(value)]
+        if key == "tools":
+            items = [(item.name, item) for item in value]
     return [(part, item) for part, item in items if is_dataclass(item)]
 
 

@@ -156,11 +156,6 @@ def view(signal: Any, array: np.ndarray) -> Any:
     return signal(*parts)
 
 
-def rows(many: Many, array: np.ndarray) -> list[Any]:
-    """The rows of an array of many things, each of numbers only, as their signals."""
-    return [*map(many.signal._make, array.reshape(len(many.names), -1).tolist())]
-
-
 def reading(signal: Any, array: str, first: int = 0) -> str:
     """Source of the expression that makes the signal of an array's elements."""
     parts = []

@@ -147,7 +147,7 @@ def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
 
 
 def test_bad_parameters_are_named():
-    with pytest.raises(ValueError, match=r"rate=-1.0 1/s: expected > 0 and <= 60"):
+    with pytest.raises(ValueError, match=r"rate=-1.0 1/s: expected >= 0.1 and <= 60"):
         ClearanceConstraint(ClearanceConstraintParams(rate=-1.0))
     with pytest.raises(ValueError, match=r"rate=60.0 1/s: expected at most .* = 30"):
         ClearanceConstraint(ClearanceConstraintParams(rate=60.0))
