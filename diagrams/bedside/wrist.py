@@ -9,12 +9,10 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.bedside.bedside import Bedside
 from diagrams.common.scenario import ScenarioError
 from plants.abdomen.wall_motion import WallMotionParams
-from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator, FulcrumParams
-from systems.passive_wrist.passive_wrist_emulation import (
-    PassiveWristEmulation,
-    WristParams,
-)
-from systems.passive_wrist.wrist_law import MODES
+from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
+from systems.passive_wrist.wrist_law import MODES, WristParams
 from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
 
 WRIST_WIRES = (

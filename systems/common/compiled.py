@@ -11,7 +11,7 @@ its first call for the types it gets and cached on disk.
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 import hashlib
 import inspect
@@ -89,6 +89,16 @@ def announced() -> AbstractContextManager[Any]:
     if not sys.stderr.isatty():
         return nullcontext()
     return install_listener("numba:compile", _Announcer())
+
+
+def rehearse(act: Callable[[], Any]) -> None:
+    """Acts once and forgets it, before a clock runs.
+
+    Kernels are compiled at their first call, or loaded from the disk: that is no part
+    of the time that the act takes. An error will come again in the act itself.
+    """
+    with announced(), suppress(Exception, SystemExit):
+        act()
 
 
 @cache

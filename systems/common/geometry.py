@@ -65,6 +65,12 @@ def scaled(t: float, a: Numbers) -> Vector:
 
 
 @compiled
+def over(a: Numbers, t: float) -> Vector:
+    """The quotient a / t."""
+    return a[0] / t, a[1] / t, a[2] / t
+
+
+@compiled
 def along(p: Numbers, t: float, d: Numbers) -> Vector:
     """The point p + t d."""
     return p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]

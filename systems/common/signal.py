@@ -12,7 +12,7 @@ columns of the log, and the tuple itself: compiled functions take it (`guide.M_R
 `view` gives the same names to arrays.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite
@@ -72,7 +72,8 @@ class Many:
 
     Attributes:
         signal: What each row is.
-        names: Of the rows: a field `x` is in the columns `x_NAME`.
+        names: Of the rows: a field `x` is in the columns `x_NAME`, a column without
+            a name of its own in NAME.
     """
 
     signal: Any
@@ -107,9 +108,16 @@ def columns(signal: Any) -> tuple[str, ...]:
     """Names of a signal's elements, as the log has them."""
     if isinstance(signal, Many):
         parts = columns(signal.signal)
-        return tuple(f"{part}_{name}" for name in signal.names for part in parts)
+        joined = [f"{part}_{name}" for name in signal.names for part in parts]
+        return tuple(column.removeprefix("_") for column in joined)
     named = fields(signal).items()
     return tuple(column for name, field in named for column in field.names(name))
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Three numbers as compiled functions take them."""
+    x, y, z = values
+    return float(x), float(y), float(z)
 
 
 def example(signal: Any) -> Any:
@@ -121,7 +129,9 @@ def example(signal: Any) -> Any:
 
 def flat(value: Any) -> np.ndarray:
     """A signal's value as a port has it: one element after the other."""
-    return np.concatenate([np.ravel(part).astype(float) for part in value])
+    if isinstance(value, tuple):
+        return np.concatenate([flat(part) for part in value])
+    return np.ravel(value).astype(float)
 
 
 def view(signal: Any, array: np.ndarray) -> Any:
@@ -170,6 +180,14 @@ def reader(signal: Any) -> Any:
     name = f"read_{signal.__name__}"
     source = f"def {name}(values):\n    return {reading(signal, 'values')}\n"
     return generated(source, name, signal, {signal.__name__: signal})
+
+
+def writer(signal: Any) -> Any:
+    """A compiled function that makes an array of a signal's elements."""
+    name = f"write_{signal.__name__}"
+    parts = ", ".join(elements(signal, "value"))
+    source = f"def {name}(value):\n    return np.array(({parts},))\n"
+    return generated(source, name, signal, {"np": np})
 
 
 def finiteness(signal: Any) -> Any:

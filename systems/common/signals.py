@@ -85,7 +85,7 @@ class Permission(NamedTuple):
     """What the passive wrist allows the task."""
 
     speed_scale: Annotated[float, Field("1", "share of its speed, 0 to stand", 1.0)]
-    code: Annotated[float, Field("1", "why it stands, a key of REASONS, or 0", 0.0)]
+    code: Annotated[float, Field("1", "why it stands: a `Stop`", 0.0)]
 
 
 class Point(NamedTuple):
