@@ -24,7 +24,7 @@ from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import Vector, along, cross, sub
 from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tool_state
-from systems.common.signal import Field, finiteness, reader, size
+from systems.common.signal import Field, finiteness, flat, reader, size
 from systems.common.signals import ToolMotion
 from systems.common.step_block import wired
 
@@ -294,7 +294,7 @@ class JointCommands(Block):
         _, _, _, weight = tool_state(self._arm[0], nominal)
         start = command(self._constants[0], nominal, np.zeros(JOINTS), weight, 0.0)
         for (name, signal), state in zip(signals.items(), start, strict=True):
-            self.state_out(name, signal, np.ravel(state))
+            self.state_out(name, signal, flat(state))
         self.update_every(params.period, self._update)
 
     def _update(self, context: Any) -> Sequence[Any]:

@@ -6,6 +6,7 @@ import pytest
 from diagrams.common.run import simulate
 from diagrams.studies import load_scenario
 from plants.abdomen.wall_motion import WallMotionParams, wave
+from systems.common.parameter import check
 
 
 @pytest.mark.parametrize("kind", ["sine", "ventilator"])
@@ -46,8 +47,14 @@ def test_insufflation_lifts_and_stiffens():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"wave": "square"}, "expected 'sine' or 'ventilator'"),
-        ({"breathing": [0.2, 0.0, 0.0]}, "at most 0.05 m"),
+        (
+            {"wave": "square"},
+            "wall_motion.wave='square': expected one of sine, ventilator",
+        ),
+        (
+            {"breathing": [0.2, 0.0, 0.0]},
+            "breathing=.* m: expected 3 numbers >= -0.05 and <= 0.05",
+        ),
         ({"breathing": [float("nan"), 0.0, 0.0]}, "breathing="),
         ({"rate": 0.0}, "rate=0.0 Hz"),
         ({"stiffening": -1.0}, "stiffening=-1.0"),
@@ -55,4 +62,4 @@ def test_insufflation_lifts_and_stiffens():
 )
 def test_bad_input(change, message):
     with pytest.raises(ValueError, match=message):
-        WallMotionParams(**change).check()
+        check(WallMotionParams(**change))
