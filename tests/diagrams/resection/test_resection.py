@@ -60,7 +60,8 @@ def test_a_case_runs_the_same_once_more(paper):
     case.scenario.duration = whole
     assert again.case is case
     for name, column in again.signals.items():
-        np.testing.assert_array_equal(column, run.signals[name][: len(column)])
+        before = run.signals[name][: len(column)]  # with more frames, of its replay
+        np.testing.assert_allclose(column, before, rtol=1e-9, atol=1e-12)
 
 
 def wires(diagram):
