@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from diagrams.bedside.wrist_plots import estimate, forces
 
-UNLIMITED = 1e3
-"""Force limit in N of the comparisons that cannot relax the wall."""
+UNLIMITED = 50.0
+"""Force limit in N of the comparisons that cannot relax the wall: the highest."""
 
 
 def compared(scenario: Any) -> dict[str, Any]:
