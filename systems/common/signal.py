@@ -182,6 +182,14 @@ def reader(signal: Any) -> Any:
     return generated(source, name, signal, {signal.__name__: signal})
 
 
+def row_writer(signal: Any) -> Any:
+    """A compiled function that writes the signal into a row of an array."""
+    name = f"write_{signal.__name__}_row"
+    parts = enumerate(elements(signal, "value"))
+    body = "".join(f"    rows[i, {k}] = {part}\n" for k, part in parts)
+    return generated(f"def {name}(rows, i, value):\n{body}", name, signal, {})
+
+
 def writer(signal: Any) -> Any:
     """A compiled function that makes an array of a signal's elements."""
     name = f"write_{signal.__name__}"

@@ -6,7 +6,7 @@ from enum import IntEnum
 class Stop(IntEnum):
     """The code of a stop, as signals carry it, and its text.
 
-    A compiled function makes a float of it with `float(int(stop))`.
+    A compiled function makes a float of it with `float(stop.value)`.
     """
 
     text: str

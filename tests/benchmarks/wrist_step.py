@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from systems.common.signal import example, flat
 from systems.common.signals import ToolMotion
 from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator
