@@ -43,8 +43,8 @@ def report(seed: int, scenes: int) -> str:
     walls = []
     for time, shaft, wrench in zip(
         run.signals["time"],
-        run.matrix("wrist.shaft"),
-        run.matrix("wrist.wrench"),
+        np.column_stack(run.wrist.shaft),
+        np.column_stack(run.wrist.wrench),
         strict=True,
     ):
         seen = {"shaft": shaft, "wrench": wrench}
