@@ -10,9 +10,9 @@ from pydrake.systems.primitives import AddRandomInputs, LogVectorOutput
 import pytest
 
 from plants.surgeon.surgeon_tool import SurgeonTool, SurgeonToolParams
-from systems.common.compiled import packed
 from systems.common.signal import size, vector, view
 from systems.common.signals import Shaft, TrackedShaft
+from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import (
     MarkerBody,
     MarkerNoise,
@@ -80,11 +80,7 @@ def test_noise_is_that_of_a_fitted_marker_body():
     tip = np.array([0.02, 0.01, -0.12])
     rng = np.random.default_rng(0)
     shaft = Shaft(vector(tip), vector(u))
-    record = packed(
-        lever=body.lever,
-        sigma_position=body.sigma_position(),
-        sigma_direction=body.sigma_direction(),
-    )[0]
+    record = optical_tracker.constants(body)[0]
     n = 6000
     noises = rng.standard_normal((n, size(MarkerNoise)))
     ours = [

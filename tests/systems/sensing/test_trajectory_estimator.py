@@ -17,9 +17,9 @@ from plants.surgeon.tool_motion import (
     tremor_motion,
     waypoint_motion,
 )
-from systems.common.compiled import packed
 from systems.common.signal import Vector, flat, vector, view
 from systems.common.signals import Estimate, Shaft, TrackedShaft
+from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import (
     MarkerBody,
     MarkerNoise,
@@ -38,11 +38,7 @@ from systems.sensing.trajectory_estimator import (
 
 DT = 1.0 / 60.0
 BODY = MarkerBody()
-MARKERS = packed(
-    lever=BODY.lever,
-    sigma_position=BODY.sigma_position(),
-    sigma_direction=BODY.sigma_direction(),
-)[0]
+MARKERS = optical_tracker.constants(BODY)[0]
 G = [0.0, 0.09, 0.0]
 
 
