@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from systems.common.geometry import sub, unit
-from systems.common.signals import Estimate
-from systems.sensing import trajectory_estimator
-from systems.sensing.optical_tracker import OpticalTrackerParams, disturb
+from systems.common.signals import Estimate, Shaft, TrackedShaft
+from systems.sensing import optical_tracker, trajectory_estimator
+from systems.sensing.optical_tracker import OpticalTrackerParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 
@@ -28,24 +28,18 @@ def tracked(
         A function of the time and the exact estimate that gives the estimate.
     """
     rng = np.random.default_rng([seed, 13, number])
-    body = OpticalTrackerParams().body
+    tracker = optical_tracker.constants(OpticalTrackerParams().body)[0]
     params = TrajectoryEstimatorParams(wall_height=wall_height)
     record = trajectory_estimator.constants(params)[0]
     state = trajectory_estimator.initial(params)
-    frames: list[np.ndarray] = []
+    frames: list[TrackedShaft] = []
 
     def sense(time: float, exact: Estimate) -> Estimate:
         nonlocal state
-        p = exact.p
-        shaft = p + unit(sub(p, exact.fulcrum))
-        seen = disturb(
-            shaft,
-            rng.standard_normal(6),
-            body.lever,
-            body.sigma_position(),
-            body.sigma_direction(),
-        )
-        frames.append(np.array(seen + (time, 1.0)))
+        shaft = Shaft(exact.p, unit(sub(exact.p, exact.fulcrum)))
+        noise = optical_tracker.read_noise(rng.standard_normal(6))
+        seen = optical_tracker.disturb(tracker, shaft, noise)
+        frames.append(TrackedShaft(seen.tip, seen.u, time, 1.0))
         if len(frames) > 1:
             state = trajectory_estimator.absorb(record, state, frames.pop(0))
         return trajectory_estimator.predict(record, state, time)
