@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from systems.common.geometry import sub, unit
+from systems.common.signal import vector
 from systems.common.signals import Estimate, Shaft, TrackedShaft
 from systems.sensing import optical_tracker, trajectory_estimator
-from systems.sensing.optical_tracker import OpticalTrackerParams
+from systems.sensing.optical_tracker import MarkerBody, MarkerNoise
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 
@@ -28,7 +29,7 @@ def tracked(
         A function of the time and the exact estimate that gives the estimate.
     """
     rng = np.random.default_rng([seed, 13, number])
-    tracker = optical_tracker.constants(OpticalTrackerParams().body)[0]
+    markers = optical_tracker.constants(MarkerBody())[0]
     params = TrajectoryEstimatorParams(wall_height=wall_height)
     record = trajectory_estimator.constants(params)[0]
     state = trajectory_estimator.initial(params)
@@ -37,8 +38,9 @@ def tracked(
     def sense(time: float, exact: Estimate) -> Estimate:
         nonlocal state
         shaft = Shaft(exact.p, unit(sub(exact.p, exact.fulcrum)))
-        noise = optical_tracker.read_noise(rng.standard_normal(6))
-        seen = optical_tracker.disturb(tracker, shaft, noise)
+        place, turn = rng.standard_normal((2, 3))
+        noise = MarkerNoise(vector(place), vector(turn))
+        seen = optical_tracker.disturb(markers, shaft, noise)
         frames.append(TrackedShaft(seen.tip, seen.u, time, 1.0))
         if len(frames) > 1:
             state = trajectory_estimator.absorb(record, state, frames.pop(0))
