@@ -9,6 +9,9 @@ MODULES = 3
 WIRES = 3
 """Wires of a module (paper, III.A): nine run through the first one."""
 
+DRUMS = WIRES * MODULES + 1
+"""Motors: one a wire, and the one that slides the robot."""
+
 
 @dataclass
 class SnakeParams:
