@@ -14,7 +14,7 @@ from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
 from plants.tissue.tissue_carver import Carving, TissueCarver
 from systems.resection.wires.procedure_player import ProcedurePlayer
-from systems.resection.wires.resection_ik import ResectionIk, from_universal
+from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.wire_drums import WireDrums
 from systems.resection.wires.wire_forward_actuation import WireForwardActuation
@@ -37,7 +37,7 @@ EXPORTS = {
     "tip.reference": "procedure_player.reference",
     "plan.progress": "procedure_player.progress",
     "snake.tool": "snake_location.tool",
-    "snake.posture": "snake_location.posture",
+    "snake.posture": "snake_location.bends",
     "ik.status": "resection_ik.status",
     "drums.limited": "wire_drums.limited",
     "wires.tension": "wire_tension.tension",
@@ -53,7 +53,7 @@ EXPORTS = {
 def make_blocks(case: Operation) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, postures, done = case.scenario, case.session.postures, case.done
-    start = from_universal(postures[done.posture].tolist())
+    start = postures[done.posture].tolist()
     lengths = wound_lengths(start, s.inverse_actuation, s.snake, s.drive)
     return {
         "procedure_player": ProcedurePlayer(

@@ -10,6 +10,7 @@ from diagrams.snake.metrics import break_time, errors, judged
 from plants.snake.actuation import wire_lengths
 from plants.snake.kinematics import centreline
 from plants.snake.parameters import MODULES, WIRES
+from plants.snake.posture import posture_of
 
 MM = 1e3
 MODULE_COLORS = ("#d93329", "#1a8c47", "#2159cc")
@@ -32,7 +33,7 @@ def path(run: Any) -> Figure:
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
     time, tip = run.signals["time"], run.scenario.tip
-    q = run.matrix("snake.posture")
+    x = posture_of(run.matrix("snake.posture"))
     tool = run.matrix("snake.tool")[:, :3] * MM
     reference = run.matrix("tip.reference")[:, :3] * MM
     if tip.poses:
@@ -41,7 +42,7 @@ def path(run: Any) -> Figure:
         )
     else:
         shown = tip.circle.ramp + tip.circle.period * np.arange(6) / 6
-    points = centreline(q, run.scenario.snake) * MM
+    points = centreline(x, run.scenario.snake) * MM
     for i in np.searchsorted(time, shown[shown <= time[-1]]):
         body = points[min(i, len(points) - 1)]
         axes.plot(*body.T, color=COLORS["robot"], lw=4, alpha=0.25)

@@ -14,6 +14,7 @@ from diagrams.snake.metrics import break_time, measure
 from diagrams.snake.plots import plots
 from diagrams.snake.scenario import SnakeScenario, check
 from diagrams.snake.wire_replay import animate_wires
+from plants.snake.posture import posture_of
 
 XYZ = ("x", "y", "z")
 TOOL = (*XYZ, "n_x", "n_y", "n_z")
@@ -55,7 +56,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
         animation,
         "wires",
         time[::every],
-        run.matrix("snake.posture")[::every],
+        posture_of(run.matrix("snake.posture")[::every]),
         run.scenario.snake,
         broken,
     )

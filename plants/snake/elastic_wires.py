@@ -9,11 +9,10 @@ import numpy as np
 from plants.snake.actuation import wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.elastic import elastic_pull
-from plants.snake.parameters import SnakeParams
+from plants.snake.parameters import DRUMS, SnakeParams
 from plants.snake.snake import FAR, NEAR_ANGLES, POSITIONS
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
-from systems.resection.wires.wire_drums import AXES
 
 
 @dataclass
@@ -80,7 +79,7 @@ class ElasticWires(Block):
         )
         self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
         self._lengths = self.vector_in("lengths", [*(straight - 2e-4), 0.0])
-        self._rates = self.vector_in("rates", [0.0] * AXES)
+        self._rates = self.vector_in("rates", [0.0] * DRUMS)
         drums = {self._lengths.ticket(), self._rates.ticket()}
         inputs = {self._state.ticket(), *drums}
         if self._params.breaks:
@@ -90,7 +89,7 @@ class ElasticWires(Block):
         self.vector_out("generalized_force", POSITIONS, self._calc_force, ticket)
         self.vector_out("tension", 9, self._calc_tension, ticket)
         measured = {self._lengths.ticket(), *ticket}
-        self.vector_out("measured", AXES, self._calc_measured, measured)
+        self.vector_out("measured", DRUMS, self._calc_measured, measured)
         self.vector_out("travel", 2, self._calc_travel, drums)
 
     def _calc_pull(self, context: Any) -> tuple[np.ndarray, np.ndarray]:

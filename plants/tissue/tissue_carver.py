@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, corners
+from plants.snake.snake_body import CULPRIT, OK, Body, between, body_of, check_body
 from plants.tissue.execution import Execution
 from plants.tissue.labels import CHANNEL, CRITICAL, TUMOUR
-from plants.tissue.space import SOLID, Space, stamp
+from plants.tissue.space import SOLID, Space, in_voxels, stamp
 from plants.tissue.volume import Volume
 from systems.common.block import Block
-from systems.common.compiled import compiled
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import along, norm, sub, xyz
 from systems.common.parameter import check, parameter
-from systems.resection.wires.resection_ik import universal
 
 
 @dataclass
@@ -36,8 +37,8 @@ class TissueCarverParams:
 
 @compiled
 def carve(
-    s: Any,
-    b: Any,
+    s: Space,
+    b: Body,
     labels: Any,
     critical: Any,
     x0: Any,
@@ -62,23 +63,20 @@ def carve(
         least distance in m of tool or body to what is critical, and the tool's way
         in m.
     """
-    c, x, why = np.empty((8, 3)), np.empty(7), np.empty(CULPRIT)
+    c, x, why = np.empty((POINTS, 3)), np.empty(7), np.empty(CULPRIT)
     corners(x0, b.h, b.tool, c)
-    p = c[7].copy()
+    p = xyz(c[7], 0)
     corners(x1, b.h, b.tool, c)
-    way = math.sqrt(
-        (c[7, 0] - p[0]) ** 2 + (c[7, 1] - p[1]) ** 2 + (c[7, 2] - p[2]) ** 2
-    )
+    way = norm(sub(c[7], p))
     steps = max(1, math.ceil(way / pitch))
     tumour, healthy, hits = 0, 0, 0
     nearest = math.inf
     for n in range(1, steps + 1):
-        for r in range(7):
-            x[r] = x0[r] + n / steps * (x1[r] - x0[r])
+        between(x0, x1, n / steps, x)
         corners(x, b.h, b.tool, c)
         hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
-        stamp(s, c[7, 0], c[7, 1], c[7, 2], b.radius, time)
+        stamp(s, c[7], b.radius, time)
         for m in range(first, s.used[0]):
             if labels[s.freed[m]] == TUMOUR:
                 tumour += 1
@@ -86,23 +84,18 @@ def carve(
                 healthy += 1
         s.used[0] = 0  # nothing here is ever rolled back by journal
         if len(critical):
-            for link in range(1, 8):
+            for link in range(6):
                 for part in range(4):
-                    share = part / 4 if link < 7 else 1.0
-                    q0 = c[link - 1, 0] + share * (c[link, 0] - c[link - 1, 0])
-                    q1 = c[link - 1, 1] + share * (c[link, 1] - c[link - 1, 1])
-                    q2 = c[link - 1, 2] + share * (c[link, 2] - c[link - 1, 2])
-                    d = interpolated(s, critical, q0, q1, q2)
-                    nearest = min(nearest, d - (b.radius if link == 7 else b.body))
+                    q = along(c[link], part / 4, sub(c[link + 1], c[link]))
+                    nearest = min(nearest, interpolated(s, critical, q) - b.body)
+            nearest = min(nearest, interpolated(s, critical, c[7]) - b.radius)
     return tumour, healthy, hits, nearest, way
 
 
 @compiled
-def interpolated(s: Any, field: Any, x: float, y: float, z: float) -> float:
+def interpolated(s: Space, field: Any, p: Numbers) -> float:
     """A field's value at a point, linear between voxels; infinite off the grid."""
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, p)
     nx, ny, nz = s.size
     i, j, k = math.floor(u), math.floor(v), math.floor(w)
     if i < 0 or j < 0 or k < 0 or i + 1 >= nx or j + 1 >= ny or k + 1 >= nz:
@@ -174,8 +167,8 @@ class TissueCarver(Block):
     State is the index of the carved moves, the posture there, and the counts; the
     voxels are a memo of it (`Carving`).
 
-    Port ``posture`` accepts s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7), the
-    snake's true posture.
+    Port ``posture`` accepts s [m], a1, b1, ..., a3, b3 [rad] (7), the snake's true
+    posture.
 
     Port ``index`` emits how many moves were carved (1).
 
@@ -206,7 +199,7 @@ class TissueCarver(Block):
         self.state_out("removed", done.removed)
         self.state_out("touched", done.touched)
         self.state_out("way", [done.way])
-        self._at = self.DeclareDiscreteState(universal(posture))
+        self._at = self.DeclareDiscreteState([*posture])
         self.update_every(self._params.period, self._update)
 
     def execution(self, context: Any, posture: int) -> Execution:
@@ -234,7 +227,7 @@ class TissueCarver(Block):
             context.get_discrete_state(group).value().tolist() for group in range(5)
         ]
         index, removed, touched, way, x0 = state
-        x1 = universal(self._posture.Eval(context).tolist())
+        x1 = self._posture.Eval(context).tolist()
         tumour, healthy, hits, nearest, moved = self.carving.move(
             int(index[0]), np.array(x0), np.array(x1), self._params.pitch
         )

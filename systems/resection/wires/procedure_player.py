@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from plants.snake.kinematics import frames
+from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
-from systems.resection.wires.resection_ik import from_universal
 
 
 @dataclass
@@ -125,10 +124,9 @@ class ProcedurePlayer(Block):
             before, after = self._times[n - 1], self._times[n]
             share = (time - before) / (after - before)
             x = self._x[n - 1] + share * (self._x[n] - self._x[n - 1])
-        chain = frames(from_universal(x.tolist()), self._snake)
-        n_WT = chain[3][:3, 2]
-        p_WT = chain[3][:3, 3] + self._snake.tool_offset * n_WT
-        return [*p_WT.tolist(), *n_WT.tolist(), *chain[2][:3, 2].tolist()]
+        c, h = np.empty((POINTS, 3)), self._snake.half_pitch
+        corners(x, h, self._snake.tool_offset, c)
+        return [*c[7].tolist(), *link_axis(c, 5, h), *link_axis(c, 3, h)]
 
     def _calc_target(self, context: Any) -> Sequence[float]:
         return self._pose(context.get_time() + self._params.lead)

@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import math
 from typing import Any
 
-from plants.snake.inverse_kinematics import REACHED, tool_posture
+from plants.snake.inverse_kernels import REACHED
+from plants.snake.inverse_kinematics import tool_posture
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
@@ -25,28 +25,6 @@ class ResectionIkParams:
     travel_rate: float = parameter(
         0.03, "largest speed of the translation", "m/s", least=1e-4, most=0.5
     )
-
-
-def universal(posture: Sequence[float]) -> list[float]:
-    """(s, a1, b1, ..., b3) of a posture (s, alpha1, beta1, ..., beta3)."""
-    x = [posture[0]]
-    for alpha, beta in zip(posture[1::2], posture[2::2], strict=True):
-        sb = math.sin(beta)
-        x.append(math.atan2(-sb * math.sin(alpha), math.cos(beta)))
-        x.append(math.asin(sb * math.cos(alpha)))
-    return x
-
-
-def from_universal(x: Sequence[float]) -> list[float]:
-    """The posture of (s, a1, b1, ..., b3)."""
-    q = [x[0]]
-    for a, b in zip(x[1::2], x[2::2], strict=True):
-        along, across = math.sin(b), -math.sin(a) * math.cos(b)
-        q.append(math.atan2(across, along))
-        q.append(
-            math.atan2(math.hypot(along, across), math.cos(a) * math.cos(b)),
-        )
-    return q
 
 
 def time_between(
@@ -72,7 +50,7 @@ def between(one: Sequence[float], other: Sequence[float], share: float) -> list[
 
 @dataclass
 class Motion:
-    """How a posture follows its goal, all in coordinates x = (s, a1, b1, ..., b3).
+    """How a posture x follows its goal.
 
     Attributes:
         x: Where the posture is to be now, (7).
@@ -134,11 +112,11 @@ class ResectionIk(Block):
     Port ``target`` accepts p_WT [m], tool axis n_WT and intermediate axis n_WI,
     channel frame W (9). The axes need not be unit vectors.
 
-    Port ``posture`` emits s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7), to be
-    reached at the period's end.
+    Port ``posture`` emits s [m], a1, b1, ..., a3, b3 [rad] (7), to be reached at
+    the period's end.
 
     Port ``status`` emits 0 if the target is reached or approached, else the limit
-    that stops it (`plants.snake.inverse_kinematics`), or -1 for no pose at all (1).
+    that stops it (`plants.snake.inverse_kernels`), or -1 for no pose at all (1).
     """
 
     def __init__(
@@ -155,7 +133,7 @@ class ResectionIk(Block):
         self._target = self.vector_in(
             "target", [0.0, 0.0, straight, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]
         )
-        x = universal(posture)
+        x = [*posture]
         self.DeclareDiscreteState(Motion(x, x, x).vector())
         self._next = self.cached(
             "next", self._calc_next, {self.xd_ticket(), self._target.ticket()}
@@ -170,15 +148,15 @@ class ResectionIk(Block):
         state = context.get_discrete_state(0).value().tolist()
         motion = Motion.of_vector(state)
         try:
-            q, status = tool_posture(self._target.Eval(context), self._snake)
+            x, status = tool_posture(self._target.Eval(context), self._snake)
         except ValueError:
             return motion.hold(), HOLD
         if status != REACHED:
             return motion.hold(), status
-        return motion.follow(universal(q), self._params), REACHED
+        return motion.follow(x, self._params), REACHED
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
-        return from_universal(self._next.Eval(context)[0].x)
+        return self._next.Eval(context)[0].x
 
     def _calc_status(self, context: Any) -> Sequence[float]:
         return [float(self._next.Eval(context)[1])]

@@ -7,10 +7,10 @@ import numpy as np
 
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import bends_of
 from plants.snake.snake import FAR, NEAR, NEAR_ANGLES, POSITIONS
 from systems.common.block import Block
 from systems.common.parameter import check
-from systems.resection.wires.resection_ik import from_universal
 
 
 class SnakeLocation(Block):
@@ -19,7 +19,10 @@ class SnakeLocation(Block):
     Port ``state`` accepts the plant's positions, then velocities, of the snake [m,
     rad, m/s, rad/s] (26).
 
-    Port ``posture`` emits s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7).
+    Port ``posture`` emits s [m], a1, b1, ..., a3, b3 [rad] (7).
+
+    Port ``bends`` emits it as the paper writes it, to be logged: s [m], alpha1, beta1,
+    ..., alpha3, beta3 [rad] (7).
 
     Port ``tool`` emits p_WT [m] and the tool's axis n_WT, channel frame W (6).
 
@@ -36,14 +39,18 @@ class SnakeLocation(Block):
         self._posture = self.cached("posture", self._calc_posture, ticket)
         known = {self._posture.ticket()}
         self.vector_out("posture", 7, self._posture.Eval, known)
+        self.vector_out("bends", 7, self._calc_bends, known)
         self.vector_out("tool", 6, self._calc_tool, known)
         self.vector_out("coupler_error", 1, self._calc_coupler_error, ticket)
 
-    def _calc_posture(self, context: Any) -> Sequence[float]:
+    def _calc_posture(self, context: Any) -> np.ndarray:
         x = self._state.Eval(context)
         near = x[NEAR]
         near[1:] = (near[1:] + x[FAR]) / 2
-        return from_universal(near.tolist())
+        return near
+
+    def _calc_bends(self, context: Any) -> Sequence[float]:
+        return bends_of(self._posture.Eval(context)).tolist()
 
     def _calc_tool(self, context: Any) -> Sequence[float]:
         X_WT = forward(self._posture.Eval(context), self._snake)

@@ -7,12 +7,9 @@ from typing import Any
 import numpy as np
 
 from plants.snake.actuation import length_range, wire_lengths
-from plants.snake.parameters import SnakeParams
+from plants.snake.parameters import DRUMS, SnakeParams
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
-
-AXES = 10
-"""Nine drums and the translation."""
 
 
 @dataclass
@@ -81,25 +78,25 @@ class WireDrums(Block):
         self._stop = self.vector_in("stop", [0.0])
         # The lengths at the last update, and its instant.
         self._start = self.DeclareDiscreteState([*start, 0.0])
-        self._rates = self.state_out("rates", [0.0] * AXES)
+        self._rates = self.state_out("rates", [0.0] * DRUMS)
         self.state_out("limited", [0.0])
         self.vector_out(
-            "lengths", AXES, self._calc_lengths, {self.xd_ticket(), self.time_ticket()}
+            "lengths", DRUMS, self._calc_lengths, {self.xd_ticket(), self.time_ticket()}
         )
         self.update_every(self._params.period, self._update)
 
     def _calc_lengths(self, context: Any) -> Sequence[float]:
         start = context.get_discrete_state(self._start).value()
         rates = context.get_discrete_state(self._rates).value()
-        elapsed = min(context.get_time() - float(start[AXES]), self._params.period)
-        return (start[:AXES] + elapsed * rates).tolist()
+        elapsed = min(context.get_time() - float(start[DRUMS]), self._params.period)
+        return (start[:DRUMS] + elapsed * rates).tolist()
 
     def _update(self, context: Any) -> Sequence[Sequence[float]]:
         now = np.array(self._calc_lengths(context))
         time, period = context.get_time(), self._params.period
         command = self._command.Eval(context)
         if self._stop.Eval(context)[0] != 0.0 or not np.isfinite(command).all():
-            return [*now, time], [0.0] * AXES, [0.0]
+            return [*now, time], [0.0] * DRUMS, [0.0]
         goal = np.minimum(np.maximum(command, self._low), self._high)
         step = goal - now
         slow = float((np.abs(step) / self._most).max())

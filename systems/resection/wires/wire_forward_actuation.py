@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.actuation import Bends, bends_of_lengths, wire_lengths
+from plants.snake.actuation import Angles, angles_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
 from systems.common.parameter import check
-from systems.resection.wires.resection_ik import universal
 
 
 class WireForwardActuation(Block):
@@ -24,10 +23,10 @@ class WireForwardActuation(Block):
 
     Port ``rates`` accepts their time derivatives [m/s] (10).
 
-    Port ``posture`` emits s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7).
+    Port ``posture`` emits s [m], a1, b1, ..., a3, b3 [rad] (7).
 
     Port ``residual`` emits how far each module's three wires disagree, as
-    |x|^2 - 1 of `plants.snake.actuation` (3).
+    |u|^2 - 1 of `plants.snake.actuation` (3).
 
     Port ``desired_state`` emits the set-point of the plant's servos: s [m], a1, b1,
     ..., b3 [rad], then seven zeros (14).
@@ -55,8 +54,9 @@ class WireForwardActuation(Block):
         straight = [*wire_lengths(np.zeros(7), self._snake).tolist(), 0.0]
         self._lengths = self.vector_in("lengths", straight)
         self._rates = self.vector_in("rates", [0.0] * 10)
-        self._bends = self.cached("bends", self._calc_bends, {self._lengths.ticket()})
-        now = {self._lengths.ticket(), self._bends.ticket()}
+        ticket = {self._lengths.ticket()}
+        self._angles = self.cached("angles", self._calc_angles, ticket)
+        now = {self._lengths.ticket(), self._angles.ticket()}
         both = {self._lengths.ticket(), self._rates.ticket()}
         self.vector_out("posture", 7, self._calc_posture, now)
         self.vector_out("residual", 3, self._calc_residual, now)
@@ -64,17 +64,17 @@ class WireForwardActuation(Block):
 
     def _calc_posture(self, context: Any) -> Sequence[float]:
         s = float(self._lengths.Eval(context)[9])
-        return [s, *self._bends.Eval(context).q.tolist()]
+        return [s, *self._angles.Eval(context).ab.tolist()]
 
-    def _calc_bends(self, context: Any) -> Bends:
-        return bends_of_lengths(self._lengths.Eval(context)[:9], self._snake)
+    def _calc_angles(self, context: Any) -> Angles:
+        return angles_of_lengths(self._lengths.Eval(context)[:9], self._snake)
 
     def _calc_residual(self, context: Any) -> Sequence[float]:
-        return self._bends.Eval(context).residual.tolist()
+        return self._angles.Eval(context).residual.tolist()
 
     def _calc_desired_state(self, context: Any) -> Sequence[float]:
         lengths, rates = self._lengths.Eval(context), self._rates.Eval(context)
         ahead = lengths[:9] + self._lead * rates[:9]
         s = float(lengths[9] + self._travel_lead * rates[9])
-        bends = bends_of_lengths(ahead, self._snake)
-        return [*universal([s, *bends.q.tolist()]), *[0.0] * 7]
+        ab = angles_of_lengths(ahead, self._snake).ab
+        return [s, *ab.tolist(), *[0.0] * 7]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from plants.snake.actuation import wire_lengths
 from plants.snake.drive import SnakeDriveParams
@@ -13,7 +14,6 @@ from plants.snake.tension import tensions
 from plants.snake.weight import GRAVITY, weight
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
-from systems.resection.wires.resection_ik import from_universal, universal
 
 
 @dataclass
@@ -42,25 +42,25 @@ class WireInverseActuationParams:
 
 
 def wound_lengths(
-    posture: Sequence[float] | np.ndarray,
+    x: ArrayLike,
     params: WireInverseActuationParams,
     snake: SnakeParams,
     drive: SnakeDriveParams,
 ) -> list[float]:
-    """Drum positions of a posture (7): wires 0 to 8 and the translation [m] (10).
+    """Drum positions of a posture x (7): wires 0 to 8 and the translation [m] (10).
 
     They hold the snake's weight as well: what gives way under it, wires or servos,
     is wound shorter by as much.
     """
-    x = universal(np.asarray(posture, float).tolist())
+    x = np.asarray(x, float)
     load = weight(x, snake, drive, params.gravity)
-    s = x[0] - float(load[0]) / drive.travel_kp
+    s = float(x[0] - load[0] / drive.travel_kp)
     if params.stiffness > 0.0:
-        L = wire_lengths(np.asarray(posture, float), snake)
+        L = wire_lengths(x, snake)
         T = tensions(x[1:], -load[1:], snake, params.least_tension)
         return [*(L - T / params.stiffness).tolist(), s]
-    ab = (np.array(x[1:]) - load[1:] / drive.kp).tolist()
-    return [*wire_lengths(from_universal([s, *ab]), snake).tolist(), s]
+    lifted = np.append(s, x[1:] - load[1:] / drive.kp)
+    return [*wire_lengths(lifted, snake).tolist(), s]
 
 
 class WireInverseActuation(Block):
@@ -68,7 +68,7 @@ class WireInverseActuation(Block):
 
     The posture is the one that the snake takes under its own weight.
 
-    Port ``posture`` accepts s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7).
+    Port ``posture`` accepts s [m], a1, b1, ..., a3, b3 [rad] (7).
 
     Port ``drums`` emits the lengths of wires 0 to 8 and the translation s [m] (10).
     """
