@@ -10,7 +10,6 @@ from plants.tissue.tissue_carver import Carving
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner, PlannerParams
 from systems.resection.planning.reach import find_reach
-from systems.resection.wires.resection_ik import from_universal
 from tests.ball import ball_session
 
 
@@ -40,7 +39,7 @@ def test_plan_is_free_by_an_independent_check(planned):
     rng = np.random.default_rng(0)
     x = session.postures
     for time in rng.choice(len(x), 150, replace=False):
-        c = centreline(from_universal(x[time].tolist()), session.params)
+        c = centreline(x[time], session.params)
         near = np.linalg.norm(points - c[7], axis=1) <= session.params.tool_radius
         assert allowed[near].all()
         for ball in c[:6]:
