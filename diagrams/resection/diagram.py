@@ -54,7 +54,8 @@ def make_blocks(case: Operation) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, postures, done = case.scenario, case.session.postures, case.done
     start = postures[done.posture].tolist()
-    lengths = wound_lengths(start, s.inverse_actuation, s.snake, s.drive)
+    winding = replace(s.inverse_actuation, period=s.period)
+    lengths = wound_lengths(start, winding, s.snake, s.drive)
     return {
         "procedure_player": ProcedurePlayer(
             replace(s.player, lead=s.period), s.snake, postures, done.posture
@@ -63,10 +64,12 @@ def make_blocks(case: Operation) -> dict[str, Any]:
             replace(s.resection_ik, period=s.period), s.snake, start
         ),
         "wire_inverse_actuation": WireInverseActuation(
-            s.inverse_actuation, s.snake, s.drive
+            winding, s.snake, s.drive, start
         ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "wire_forward_actuation": WireForwardActuation(
+            s.snake, s.drive, s.period, start
+        ),
         "snake_location": SnakeLocation(s.snake),
         "wire_watch": WireWatch(replace(s.watch, period=s.period)),
         "wire_tension": WireTension(s.tension, s.snake),

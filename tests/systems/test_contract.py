@@ -212,8 +212,6 @@ what it cannot judge, and a camera out of sight is no obstacle."""
 FAIL = {
     *("ArcNavigation.fulcrum", "ArcNavigation.permission"),
     "PassiveWristEmulation.estimate",
-    *("WireForwardActuation.lengths", "WireForwardActuation.rates"),
-    "WireInverseActuation.posture",
 }
 """Inputs for which it does not hold yet."""
 CASES = [

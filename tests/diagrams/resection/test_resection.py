@@ -45,9 +45,9 @@ def test_paper(paper):
 def test_carving_keeps_up(paper):
     """Each instant carves what was swept since the one before: a few stamps."""
     run, _ = paper
-    instants = run.signals["tissue.index"]
+    instants = run.tissue.index.number
     assert instants[-1] == round(run.simulated / run.scenario.period)
-    carved, way = np.diff(instants), np.diff(run.signals["tissue.way"])
+    carved, way = np.diff(instants), np.diff(run.tissue.way.length)
     assert carved.min() >= 4 and carved.max() <= 6  # in 0.1 s
     assert (way / carved).max() <= 4 * run.scenario.carver.pitch
 

@@ -17,18 +17,19 @@ from plants.snake.weight import weight
 from systems.common.parameter import check
 from systems.resection.wires.resection_ik import (
     HOLD,
-    Motion,
     ResectionIk,
     ResectionIkParams,
+    follow,
+    standing,
     time_between,
 )
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tip_reference import (
     CircleParams,
+    PoseParams,
     TipReference,
     TipReferenceParams,
-    ToolPose,
-    circle_pose,
+    circle_target,
     reference,
 )
 from systems.resection.wires.wire_drums import WireDrums, WireDrumsParams
@@ -92,12 +93,13 @@ def test_resection_ik_approaches_a_far_target_smoothly_and_meets_it():
 
 def test_a_slow_goal_is_met_exactly():
     params = ResectionIkParams()
-    motion = Motion([0.0] * 7, [0.0] * 7, [0.0] * 7)
+    motion = standing(np.zeros(7))
     for k in range(1, 50):
-        goal = [0.0, *[0.5 * params.bend_rate * params.period * k] * 6]
-        motion = motion.follow(goal, params)
+        goal = np.array([0.0, *[0.5 * params.bend_rate * params.period * k] * 6])
+        motion = follow(motion, goal, params)
         np.testing.assert_allclose(motion.x, goal, atol=1e-15)
-    assert time_between(motion.x, [0.03, *motion.x[1:]], params) == pytest.approx(1.0)
+    shift = np.array([params.travel_rate, *[0.0] * 6])
+    assert time_between(motion.x, motion.x + shift, params) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -128,9 +130,9 @@ def test_inverse_and_forward_actuation_undo_each_other():
     np.testing.assert_allclose(desired, [*POSTURE, *[0.0] * 7], atol=1e-10)
 
 
-def test_forward_actuation_leads_by_lag_and_hold():
+def test_forward_actuation_leads_by_lag_and_period():
     drive = SnakeDriveParams()
-    dut = WireForwardActuation(hold=0.02)
+    dut = WireForwardActuation(period=0.02)
     later = np.array(POSTURE) + 1e-3 * np.array([1, 0.1, 0.2, 0.1, -0.2, 0, 0.1])
     one = np.array([*wire_lengths(POSTURE, SNAKE), POSTURE[0]])
     two = np.array([*wire_lengths(later, SNAKE), later[0]])
@@ -266,21 +268,21 @@ def test_reference_circle():
     circle = CircleParams(p_WC=[0.0, 0.01, 0.04], n_WT=[0.0, 1.0, 1.0])
     n = np.array(circle.n_WT) / math.sqrt(2)
     for time in np.linspace(0.0, 5.0, 40):
-        v = np.array(circle_pose(circle, time))
-        offset = v[:3] - circle.p_WC
+        target = circle_target(circle, time)
+        offset = np.subtract(target.p, circle.p_WC)
         assert np.linalg.norm(offset) == pytest.approx(circle.radius)
         assert offset @ n == pytest.approx(0.0, abs=1e-15)
-        assert math.acos(v[6:] @ n) == pytest.approx(circle.lean)
-    full = np.array(circle_pose(circle, 5.0)) - circle_pose(circle, 1.0)
-    np.testing.assert_allclose(full, 0.0, atol=1e-12)
+        assert math.acos(target.n_I @ n) == pytest.approx(circle.lean)
+    one, other = circle_target(circle, 1.0), circle_target(circle, 5.0)
+    np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 def test_reference_poses_take_turns():
-    poses = [ToolPose(p_WT=[0.0, 0.0, 0.04]), ToolPose(p_WT=[0.01, 0.0, 0.04])]
+    poses = [PoseParams(p_WT=[x, 0.0, 0.04]) for x in (0.0, 0.01)]
     params = TipReferenceParams(poses=poses, dwell=2.0, lead=0.02)
-    assert reference(params, 1.99)[0] == 0.0
-    assert reference(params, 2.0)[0] == 0.01
-    assert reference(params, 4.1)[0] == 0.0
+    assert reference(params, 1.99).p[0] == 0.0
+    assert reference(params, 2.0).p[0] == 0.01
+    assert reference(params, 4.1).p[0] == 0.0
     dut = TipReference(params)
     context = dut.CreateDefaultContext()
     context.SetTime(1.99)
@@ -314,11 +316,11 @@ def test_reference_poses_take_turns():
         (TipReferenceParams(dwell=0.0), "tip_reference.dwell=0.0 s: expected >= 0.1"),
         (TipReferenceParams(lead=-1.0), "tip_reference.lead=-1.0 s"),
         (
-            TipReferenceParams(poses=[ToolPose(n_WT=[0.0, 0.0, 0.0])]),
+            TipReferenceParams(poses=[PoseParams(n_WT=[0.0, 0.0, 0.0])]),
             r"poses\[0\].n_WT=.*expected a direction",
         ),
         (
-            TipReferenceParams(poses=[ToolPose(p_WT=[0.0])]),
+            TipReferenceParams(poses=[PoseParams(p_WT=[0.0])]),
             r"poses\[0\].p_WT=.*expected 3 numbers",
         ),
     ],
