@@ -12,7 +12,7 @@ from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import refusals
 from diagrams.resection.operation import finish_plan, new_session, reach_of
 from diagrams.resection.scenario import ResectionScenario
-from plants.tissue.volume import TUMOUR
+from plants.tissue.labels import TUMOUR
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import (

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-BRAIN, TUMOUR, CRITICAL = 0, 1, 2
-"""Labels of a `Tissue`."""
+from plants.tissue.labels import BRAIN, CRITICAL, TUMOUR
 
 
 @dataclass

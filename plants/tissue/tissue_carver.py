@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, corners
 from plants.tissue.execution import Execution
+from plants.tissue.labels import CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID, Space, stamp
-from plants.tissue.volume import CHANNEL, TUMOUR, Volume
+from plants.tissue.volume import Volume
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.resection.wires.resection_ik import universal
@@ -86,7 +87,7 @@ def carve(
         first = s.used[0]
         stamp(s, c[7, 0], c[7, 1], c[7, 2], b.radius, time)
         for m in range(first, s.used[0]):
-            if labels[s.freed[m]] == 1:
+            if labels[s.freed[m]] == TUMOUR:
                 tumour += 1
             else:
                 healthy += 1
@@ -149,7 +150,7 @@ class Carving:
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
         self.body = body_of(params)
-        critical = (volume.labels == 4).any()
+        critical = (volume.labels == CRITICAL).any()
         distance = volume.distance_to_critical() if critical else np.empty(0)
         self.critical: NDArray[np.float64] = distance.reshape(-1)
         self.latest = self.done.index

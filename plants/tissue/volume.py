@@ -16,13 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.tissue import tissue
+from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID, Space, journals
 from plants.tissue.tissue import Tissue, signed_distance
-
-BRAIN, TUMOUR, CHANNEL, CAP, CRITICAL = 0, 1, 2, 3, 4
-NAMES = ("brain", "tumour", "channel", "cap", "critical")
-"""Labels of a `Volume`."""
 
 Vector = NDArray[np.float64]
 
@@ -221,7 +217,7 @@ def _is_tumour(body: Tissue, points: Vector, X_VP: Vector) -> NDArray[np.bool_]:
     index = np.rint(points @ X_VP[:3, :3].T + X_VP[:3, 3]).astype(int)
     inside = ((index >= 0) & (index < body.labels.shape)).all(axis=1)
     hit = np.zeros(len(points), bool)
-    hit[inside] = body.labels[tuple(index[inside].T)] == tissue.TUMOUR
+    hit[inside] = body.labels[tuple(index[inside].T)] == TUMOUR
     return hit
 
 
@@ -265,9 +261,9 @@ def make_volume(
     origin = first * spacing
     X_VW = np.linalg.inv(body.X_PV) @ X_PW
     labels = np.zeros(size, np.uint8)
-    for source, label in ((tissue.TUMOUR, TUMOUR), (tissue.CRITICAL, CRITICAL)):
-        if (body.labels == source).any():
-            labels[_resampled(body, source, X_VW, origin, spacing, size)] = label
+    for label in (TUMOUR, CRITICAL):
+        if (body.labels == label).any():
+            labels[_resampled(body, label, X_VW, origin, spacing, size)] = label
     if not (labels == TUMOUR).any():
         raise ValueError(
             f"spacing={spacing} m: {body.name} vanishes between the voxels; "
@@ -279,14 +275,14 @@ def make_volume(
 
 def _resampled(
     body: Tissue,
-    source: int,
+    label: int,
     X_VW: Vector,
     origin: Vector,
     spacing: float,
     size: Vector,
 ) -> NDArray[np.bool_]:
     """Where on the grid the shape of a label is."""
-    mask = np.pad(body.labels == source, 2)
+    mask = np.pad(body.labels == label, 2)
     shape = signed_distance(mask, body.spacing.tolist())
     matrix = spacing * X_VW[:3, :3]
     offset = X_VW[:3, :3] @ origin + X_VW[:3, 3] + 2

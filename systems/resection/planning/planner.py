@@ -10,14 +10,15 @@ first those that gain much, then those that gain little.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 import math
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plants.snake.last_module import meridian
+from plants.tissue.labels import TUMOUR
 from plants.tissue.space import SOLID
-from systems.resection.planning.growth import grow, seed_random
+from systems.resection.planning.draws import new_draws
+from systems.resection.planning.growth import grow
 from systems.resection.planning.procedure import ELEMENTARY, ENTRY, Procedure
 from systems.resection.planning.session import Session
 from systems.resection.planning.sweep import intermediate, straightened, try_procedure
@@ -55,7 +56,7 @@ class PlannerParams:
         rounds: Through all lumps in a stage but the last, which goes on.
         attempts: Of steps in a lump before the finisher looks at what they gained;
             four times as many in the last stage.
-        time_limit: After which the finisher ends, in s.
+        budget: Single steps that the finisher tries at most.
         seed: Of all random choices.
     """
 
@@ -74,7 +75,7 @@ class PlannerParams:
     )
     rounds: int = 4
     attempts: int = 400
-    time_limit: float = 120.0
+    budget: int = 20_000_000
     seed: int = 1
 
     def check(self) -> None:
@@ -94,8 +95,11 @@ class PlannerParams:
             raise ValueError(
                 f"planner.step_gains={self.step_gains} m3: expected at least one, >= 0"
             )
-        if self.rounds < 1 or self.attempts < 1:
-            raise ValueError("planner.rounds and planner.attempts: expected at least 1")
+        for name in ("rounds", "attempts", "budget"):
+            if getattr(self, name) < 1:
+                raise ValueError(
+                    f"planner.{name}={getattr(self, name)}: expected at least 1"
+                )
         if not all(0.0 < bend <= math.pi / 4 + 1e-9 for bend in self.passes):
             raise ValueError(f"planner.passes={self.passes} rad: expected 0 to pi/4")
 
@@ -124,7 +128,8 @@ class Planner:
         self.goal = np.flatnonzero(reachable.reshape(-1)).astype(np.int32)
         self.progress = progress
         self.rng = np.random.default_rng(self.params.seed)
-        self.deadline = math.inf
+        self.draws = new_draws(self.params.seed + len(session.steps))
+        self.tried = 0
 
     def left(self) -> NDArray[np.int32]:
         """Voxels of the goal that are still there."""
@@ -143,11 +148,9 @@ class Planner:
         """
         if self.session.concluded == repr(self.params):
             return
-        seed_random(self.params.seed + len(self.session.steps))
         self.enter()
         while self.share < self.params.target and self.choose():
             self.progress(self.share)
-        self.deadline = perf_counter() + self.params.time_limit
         for stage, gain in enumerate(self.params.step_gains):
             last = stage + 1 == len(self.params.step_gains)
             attempts = self.params.attempts * (4 if last else 1)
@@ -164,8 +167,8 @@ class Planner:
         self.session.save_if_filed()
 
     def unfinished(self) -> bool:
-        """Whether the target is not reached, and there is time."""
-        return self.share < self.params.target and perf_counter() < self.deadline
+        """Whether the target is not reached, and some of the budget is left."""
+        return self.share < self.params.target and self.tried < self.params.budget
 
     def _radius(self, bend: float) -> float:
         params = self.session.params
@@ -174,7 +177,7 @@ class Planner:
     def enter(self) -> None:
         """The entry's passes, to the far end of the tumour, but those made before."""
         volume = self.session.volume
-        deepest = float(volume.points(volume.labels == 1)[:, 2].max())
+        deepest = float(volume.points(volume.labels == TUMOUR)[:, 2].max())
         length = deepest - volume.depth + self.session.params.tool_radius
         travel = self.session.params.travel[1] - float(self.session.home[0])
         length = min(max(length, self.params.pitch), travel)
@@ -279,7 +282,11 @@ class Planner:
             open_ &= ~near
             tries = np.zeros(len(lump), np.int32)
             while len(lump) and session.roomy():
-                done = grow(s, b, t, lump, tries, attempts, WEARY, least, True, why)
+                count = min(attempts, params.budget - self.tried)
+                done = grow(
+                    s, b, t, self.draws, lump, tries, count, WEARY, least, True, why
+                )
+                self.tried += count
                 made += done
                 alive = (s.tau[lump] == SOLID) & (tries < WEARY)
                 lump, tries = lump[alive], tries[alive]
