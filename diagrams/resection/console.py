@@ -20,6 +20,7 @@ from systems.resection.planning.procedure import (
     ENTRY,
     VOLUME,
     Procedure,
+    check_procedure,
     load_procedures,
     save_procedures,
 )
@@ -83,7 +84,7 @@ class Console:
         command = words[0]
         if command in (ENTRY, ELEMENTARY, VOLUME):
             proposal = procedure_from(words)
-            proposal.check(self.session.params)
+            check_procedure(proposal, self.session.params)
             self.proposal = proposal
             return self._check()
         if command == "suggest":

@@ -40,7 +40,7 @@ UNLIMITED = 50.0
 
 
 def companions(scenario: WristScenario) -> dict[str, WristScenario]:
-    """The scenario in the other modes that it names, without a force limit.
+    """The scenario in the other modes that it names, with the highest force limit.
 
     A wrist that cannot relax the wall would stand still for ever.
     """

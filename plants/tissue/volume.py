@@ -19,38 +19,39 @@ from scipy import ndimage
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID, Space, journals
 from plants.tissue.tissue import Tissue, signed_distance
+from systems.common.parameter import Rules, check, parameter
 
 Vector = NDArray[np.float64]
 
 
 @dataclass
 class Access:
-    """Where and how the access robot reaches the tumour.
+    """Where and how the access robot reaches the tumour."""
 
-    Attributes:
-        point: A point on the channel's axis in P, in m; the tumour's centroid if
-            None. A point outside is where the channel starts.
-        direction: Of the channel, into the tumour, in P; proposed if None.
-        clearance: Of the body in the channel, in m.
-    """
+    # A point outside is where the channel starts.
+    point: list[float] | None = parameter(
+        None,
+        "a point on the channel's axis in P; the tumour's centroid if left out",
+        "m",
+        least=-2.0,
+        most=2.0,
+        shape=(3,),
+    )
+    direction: list[float] | None = parameter(
+        None,
+        "of the channel, into the tumour, in P; proposed if left out",
+        least=-1e3,
+        most=1e3,
+        shape=(3,),
+    )
+    clearance: float = parameter(
+        1.0e-3, "of the body in the channel", "m", above=0.0, most=0.01
+    )
 
-    point: list[float] | None = None
-    direction: list[float] | None = None
-    clearance: float = 1.0e-3
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name in ("point", "direction"):
-            v = getattr(self, name)
-            if v is not None and (len(v) != 3 or not all(map(math.isfinite, v))):
-                raise ValueError(f"access.{name}={v}: expected three finite numbers")
-        if self.direction is not None and math.hypot(*self.direction) < 1e-9:
-            raise ValueError(f"access.direction={self.direction}: expected a direction")
-        if not 0.0 < self.clearance <= 0.01:
-            raise ValueError(
-                f"access.clearance={self.clearance} m: expected > 0 and at most 0.01; "
-                "the default is 0.001"
-            )
+    def rules(self) -> Rules:
+        """A direction has a length."""
+        n = self.direction
+        yield n is None or math.hypot(*n) >= 1e-9, "direction", "a direction"
 
 
 @dataclass
@@ -179,7 +180,7 @@ def channel_frame(body: Tissue, access: Access) -> Vector:
     Raises:
         ValueError: If the line misses the tumour; it says by how much.
     """
-    access.check()
+    check(access)
     if access.direction is None:
         raise ValueError("access.direction is not given; propose one first")
     z = np.array(access.direction, float)
