@@ -210,8 +210,6 @@ GO_ON = {
 """Inputs without which a block goes on, no faster than before: the constraint lets pass
 what it cannot judge, and a camera out of sight is no obstacle."""
 FAIL = {
-    *("ArcNavigation.fulcrum", "ArcNavigation.permission"),
-    "PassiveWristEmulation.estimate",
     *("WireForwardActuation.lengths", "WireForwardActuation.rates"),
     "WireInverseActuation.posture",
 }
