@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+from plants.snake.kinematics import turned
 from systems.common.block import Block
+from systems.common.geometry import along, cross, dot, unit
 
 
 @dataclass
@@ -97,23 +99,13 @@ def circle_pose(circle: CircleParams, time: float) -> list[float]:
     ramp = circle.ramp
     turns = time * time / (2 * ramp) if time < ramp else time - ramp / 2
     angle = 2 * math.pi * turns / circle.period
-    nx, ny, nz = (x / math.hypot(*circle.n_WT) for x in circle.n_WT)
+    n = unit(tuple(circle.n_WT))
     # Two axes across n: the world's x as far as it goes, or y.
-    ux, uy, uz = (1.0, 0.0, 0.0) if abs(nx) < 0.9 else (0.0, 1.0, 0.0)
-    along = ux * nx + uy * ny + uz * nz
-    ux, uy, uz = ux - along * nx, uy - along * ny, uz - along * nz
-    size = math.hypot(ux, uy, uz)
-    ux, uy, uz = ux / size, uy / size, uz / size
-    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
-    c, s = math.cos(angle), math.sin(angle)
-    rx, ry, rz = c * ux + s * vx, c * uy + s * vy, c * uz + s * vz
-    cl, sl = math.cos(circle.lean), math.sin(circle.lean)
-    x, y, z = circle.p_WC
-    return [
-        *(x + circle.radius * rx, y + circle.radius * ry, z + circle.radius * rz),
-        *(nx, ny, nz),
-        *(cl * nx + sl * rx, cl * ny + sl * ry, cl * nz + sl * rz),
-    ]
+    x = (1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0)
+    u = unit(along(x, -dot(x, n), n))
+    out, _ = turned(u, cross(n, u), math.cos(angle), math.sin(angle))
+    n_WI, _ = turned(n, out, math.cos(circle.lean), math.sin(circle.lean))
+    return [*along(tuple(circle.p_WC), circle.radius, out), *n, *n_WI]
 
 
 def reference(params: TipReferenceParams, time: float) -> list[float]:
