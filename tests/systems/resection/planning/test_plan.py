@@ -1,5 +1,11 @@
 """Reach, planner and map on a small tumour, and the plan checked from outside."""
 
+import hashlib
+import os
+from pathlib import Path
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -12,18 +18,15 @@ from systems.resection.planning.planner import Planner, PlannerParams
 from systems.resection.planning.reach import find_reach
 from tests.ball import ball_session
 
-
-def plan(spacing=1e-3, effort=0.25):
-    """A session on the ball, planned, and its reachable part."""
-    session = ball_session(spacing)
-    reach = find_reach(session, effort=effort)
-    Planner(session, reach.mask, PlannerParams()).run()
-    return session, reach
+ROOT = Path(__file__).parents[4]
 
 
 @pytest.fixture(scope="module")
 def planned():
-    return plan()
+    session = ball_session()
+    reach = find_reach(session, effort=0.25)
+    Planner(session, reach.mask, PlannerParams()).run()
+    return session, reach
 
 
 def test_most_of_the_reachable_part_is_planned(planned):
@@ -65,14 +68,42 @@ def test_nothing_stands_out_between_the_checks(planned):
         assert hits == 0, f"on the way to posture {index + 1}"
 
 
-def test_same_seed_same_plan():
-    (one, reach), (two, again) = (plan(2e-3, 0.1) for _ in range(2))
-    np.testing.assert_array_equal(reach.mask, again.mask)
-    np.testing.assert_array_equal(one.postures, two.postures)
-    assert [step.procedure for step in one.steps] == [
-        step.procedure for step in two.steps
+def digest() -> str:
+    """Of a whole plan, on voxels of 2 mm: reach with reasons, postures, space."""
+    session = ball_session(2e-3)
+    reach = find_reach(session, effort=0.1)
+    Planner(session, reach.mask, PlannerParams(budget=20_000)).run()
+    tree = session.tree.route[: len(session.postures)]
+    parts = [reach.mask, session.postures, tree, session.volume.tau]
+    content = b"".join(part.tobytes() for part in parts)
+    return hashlib.sha256(content + repr(reach.lumps).encode()).hexdigest()
+
+
+def test_same_seed_same_plan(planned):
+    """In any process, after other searches, fast or slow, whatever hashes are."""
+    program = f"from {__name__} import digest; print(digest())"
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", program],
+            env=os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)},
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for seed in ("1", "2")  # at the same time: they slow each other down
     ]
-    np.testing.assert_array_equal(one.volume.tau, two.volume.tau)
+    plans = [process.communicate()[0].strip() for process in both]
+    assert plans == [digest()] * 2
+
+
+def test_the_budget_counts_steps():
+    session = ball_session(2e-3)
+    params = PlannerParams(budget=1000, candidates=1)
+    planner = Planner(session, session.volume.allowed > 0, params)
+    planner.run()
+    assert planner.tried == params.budget
+    assert planner.share < params.target
+    assert session.steps[-1].kind == "home"
 
 
 def test_map_says_where(planned):
