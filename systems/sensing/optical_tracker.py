@@ -225,6 +225,8 @@ class OpticalTracker(Block):
         self.DeclareDiscreteState(flat((UNSEEN,) * (frames * len(tools))))
         for tool in tools:
             self.state_out(f"{tool}_measured", TrackedShaft, flat(UNSEEN))
+        firsts = [_FRAME * tool for tool in range(len(tools))]
+        self._delivered = [slice(first, first + _FRAME) for first in firsts]
         self.update_every(params.period, self._update)
 
     def _update(self, context: Any) -> tuple[np.ndarray, ...]:
@@ -236,7 +238,7 @@ class OpticalTracker(Block):
             self._noise.Eval(context),
             *[port.Eval(context) for port in self._shafts],
         )
-        return line, *line[: len(self._shafts) * _FRAME].reshape(-1, _FRAME)
+        return line, *[line[place] for place in self._delivered]
 
 
 def _packed_losses(losses: Sequence[SightLoss], tools: Sequence[str]) -> np.ndarray:
