@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 import math
 from pathlib import Path
+import sys
 from time import perf_counter
 from typing import Any
 
@@ -14,13 +15,10 @@ from diagrams.common.scenario import Scenario, ScenarioError
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.tissue.execution import Execution, load_execution
+from plants.tissue.mask import load_mask
+from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.space import NEIGHBOUR
-from plants.tissue.tissue import (
-    SyntheticTumour,
-    Tissue,
-    load_mask,
-    synthetic_tumour,
-)
+from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
 from plants.tissue.tissue_carver import TissueCarverParams
 from plants.tissue.volume import Access, make_volume
 from systems.common.archive import beside
@@ -41,29 +39,13 @@ LOG_PERIOD = 0.1
 
 
 @dataclass
-class MaskLabels:
-    """Which labels of a mask mean what.
-
-    Attributes:
-        tumour: Tumour; all but 0 and the critical ones if empty.
-        critical: What must not be touched.
-        component: Which connected part: 1 for the largest, ...; 0 if there must be
-            one alone.
-    """
-
-    tumour: list[int] = field(default_factory=list)
-    critical: list[int] = field(default_factory=list)
-    component: int = 0
-
-
-@dataclass
 class ResectionScenario(Scenario):
     """Martin et al., section V: a tumour is resected by a sequence of procedures.
 
     `duration` is the longest; the run ends when the plan has been carried out.
 
     Attributes:
-        mask: A patient's mask (NRRD, NIfTI, ...); the synthetic tumour if empty.
+        mask: A patient's mask (NRRD, NIfTI, MetaImage); the synthetic tumour if empty.
         labels: What the mask's labels mean.
         tumour: The synthetic tumour.
         access: Point and direction of the channel; proposed without a direction.
@@ -163,10 +145,7 @@ def check(scenario: ResectionScenario) -> None:
 def tissue_of(scenario: ResectionScenario) -> Tissue:
     """The tissue before the operation."""
     if scenario.mask:
-        labels = scenario.labels
-        return load_mask(
-            scenario.mask, labels.tumour, labels.critical, labels.component
-        )
+        return load_mask(scenario.mask, scenario.labels)
     return synthetic_tumour(scenario.tumour)
 
 
@@ -184,6 +163,8 @@ def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
         # A ball whose voxels keep a distance may stand out of them by half a diagonal.
         scenario.margin + scenario.tracking + NEIGHBOUR * scenario.spacing,
     )
+    for note in [*tissue.notes, *volume.notes]:
+        print(f"trocar: {tissue.name}: {note}", file=sys.stderr)
     session = Session(volume, scenario.snake, scenario.clearance, scenario.accuracy)
     return session, tissue.name
 

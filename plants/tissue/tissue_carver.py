@@ -149,9 +149,7 @@ class Carving:
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
         self.body = body_of(params)
-        critical = (volume.labels == 4).any()
-        distance = volume.distance_to_critical() if critical else np.empty(0)
-        self.critical: NDArray[np.float64] = distance.reshape(-1)
+        self.critical: NDArray[np.float32] = volume.to_critical.reshape(-1)
         self.latest = self.done.index
         self.space: Space = self.volume.space()
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of, corners
+from plants.tissue.critical import Boxes
 from plants.tissue.space import roll_back
 from plants.tissue.volume import Volume
 from systems.common.archive import read_archive, write_archive
@@ -305,12 +306,16 @@ class Session:
             "tip": t.tip[:nodes],
             "route": t.route[:visits],
         }
+        if v.critical is not None:
+            arrays |= {"critical": v.critical.index, "X_WV": v.critical.X_WV}
         meta = {
             "format": 1,
             "spacing": v.spacing,
             "channel": v.channel,
             "channel_depth": v.depth,
             "margin": v.margin,
+            "mask_volume": v.mask_volume,
+            "notes": v.notes,
             "clearance": self.clearance,
             "accuracy": self.accuracy,
             "params": asdict(self.params),
@@ -336,6 +341,9 @@ def load_session(path: Path) -> Session:
         arrays["X_PW"],
         meta["margin"],
         arrays["tau"],
+        Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
+        mask_volume=meta["mask_volume"],
+        notes=meta["notes"],
     )
     session = Session(
         volume, SnakeParams(**meta["params"]), meta["clearance"], meta["accuracy"]

@@ -3,15 +3,8 @@
 import pytest
 
 from plants.snake.parameters import SnakeParams
-from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
 from plants.tissue.volume import Access, make_volume
 from systems.resection.planning.session import Session
-
-
-@pytest.fixture(scope="session")
-def ball_tissue() -> Tissue:
-    """A ball of 30 mm, 1 mm voxels."""
-    return synthetic_tumour(SyntheticTumour(length=0.03, lobes=0, roughness=0.0))
 
 
 @pytest.fixture(scope="session")
