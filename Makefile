@@ -1,7 +1,7 @@
 # make setup     the virtual environment .venv (the other targets call it)
 # make demo      runs gauze_dynamic: figures, plots and a replay in out/
 # make test      style, types and all tests
-# make bench     benchmarks, side by side (SEED=N for other scenes)
+# make bench     benchmarks, side by side (SEED=N for other scenes, ONLY=NAME for one)
 # make notebook  opens the notebooks in Jupyter
 
 PYTHON ?= python3.12
@@ -28,7 +28,7 @@ test: setup
 	$(BIN)/python -m pytest -m "not study"
 
 bench: setup
-	$(BIN)/python -m tests.benchmarks --seed $(SEED)
+	$(BIN)/python -m tests.benchmarks --seed $(SEED) $(ONLY)
 
 notebook: setup
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt jupyterlab

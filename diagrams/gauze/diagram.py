@@ -154,13 +154,8 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         )
         for tool in (target, obstacle)
     ]
-    limits = replace(
-        s.workspace,  # the planner knows the limits of the navigation behind it
-        min_insertion=s.navigation.min_insertion,
-        max_insertion=s.navigation.max_insertion,
-        max_tilt=s.navigation.max_tilt,
-        cone_margin=s.navigation.cone_margin,
-    )
+    # The planner knows the limits of the navigation behind it.
+    around = (s.margins, s.navigation, s.workspace)
     blocks = {
         "target_tool": SurgeonTool(target),
         "obstacle_tool": HuntingTool(obstacle, s.hunt)
@@ -174,15 +169,13 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
         "robot_location": RobotLocation(s.instrument),
-        "go_to_target": ToolBypass(s.tool_bypass, s.margins, limits)
+        "go_to_target": ToolBypass(s.tool_bypass, *around)
         if s.behaviour == "bypass"
         else GoToTarget(s.go_to_target),
         "velocity_corrections": VelocityCorrections(s.velocity_corrections),
         "backward_movement": BackwardMovement(s.backward_movement),
         "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter),
-        "clearance_constraint": ClearanceConstraint(
-            s.clearance_constraint, s.margins, limits
-        ),
+        "clearance_constraint": ClearanceConstraint(s.clearance_constraint, *around),
         "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }

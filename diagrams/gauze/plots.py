@@ -27,10 +27,9 @@ def trajectory(run: Any) -> Figure:
     """The trajectory in 3-D with both of the surgeon's tools (Figures 7, 8 above)."""
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
-    tool = run.matrix("robot.tool") * MM
-    tip, p_WG = tool[:, 3:], tool[0, :3]
-    target = run.matrix("target.shaft")[:, :3] * MM
-    obstacle = run.matrix("obstacle.shaft")[:, :3] * MM
+    tip, p_WG = run.robot.tool.tip * MM, run.robot.tool.fulcrum[0] * MM
+    target = run.target.shaft.tip * MM
+    obstacle = run.obstacle.shaft.tip * MM
     p_WGO, p_WGS = _fulcrum(run, "obstacle") * MM, _fulcrum(run, "target") * MM
     marks = max(1, len(tip) // 60)
     axes.plot(*tip.T, color=COLORS["robot"], lw=0.8)
@@ -61,11 +60,11 @@ def speeds(run: Any) -> Figure:
     """
     figure = new_figure(7.0, 5.6)
     time = run.signals["time"]
-    guide = run.matrix("planner.guide")
-    s = np.maximum(guide[:, 7], run.scenario.navigation.min_proportion)
-    v_1 = np.linalg.norm(run.matrix("planner.v1"), axis=1) / s
-    v_R = np.linalg.norm(run.matrix("planner.v_R"), axis=1) / s
-    v_O = np.linalg.norm(run.matrix("obstacle.tip_velocity"), axis=1) * guide[:, 8]
+    guide = run.planner.guide
+    s = np.maximum(guide.s, run.scenario.navigation.min_proportion)
+    v_1 = np.linalg.norm(run.planner.v1.v, axis=1) / s
+    v_R = np.linalg.norm(run.planner.v_R.v, axis=1) / s
+    v_O = np.linalg.norm(run.obstacle.tip_velocity.v, axis=1) * guide.l_over_L
     upper = add_axes(figure, 2, 1, 1)
     upper.plot(time, v_R * MM, "-", color=COLORS["robot"], label="commanded v_R")
     upper.plot(time, v_1 * MM, "--", color=COLORS["accent"], label="field v_1")
@@ -73,11 +72,9 @@ def speeds(run: Any) -> Figure:
     upper.set(ylabel="speed of the tip [mm/s]", xlim=(0, time[-1]), ylim=(0, None))
     upper.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
-    clearance = run.matrix("clearance") * MM
-    error = np.linalg.norm(
-        run.matrix("robot.tool")[:, 3:] - run.matrix("target.shaft")[:, :3], axis=1
-    )
-    lower.plot(time, clearance[:, 0], color=COLORS["obstacle"], label="clearance to O")
+    gap = run.clearance.obstacle * MM
+    error = np.linalg.norm(run.robot.tool.tip - run.target.shaft.tip, axis=1)
+    lower.plot(time, gap, color=COLORS["obstacle"], label="clearance to O")
     lower.plot(time, error * MM, color=COLORS["target"], label="tip to S's tip")
     lower.axhline(0.0, color="k", lw=0.6)
     for stop in run.metrics["stops"]:
@@ -96,11 +93,11 @@ def forces(run: Any) -> Figure:
     figure = new_figure(7.0, 4.2)
     time = run.signals["time"]
     upper = add_axes(figure, 2, 1, 1)
-    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+    force = np.linalg.norm(run.wall.force.f, axis=1)
     upper.plot(time, force, color=COLORS["obstacle"])
     upper.set(ylabel="lateral force [N]", xlim=(0, time[-1]), ylim=(0, None))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
-    lower.plot(time, run.signals["wall.fulcrum_error"] * MM, color=COLORS["robot"])
+    lower.plot(time, run.wall.fulcrum_error.distance * MM, color=COLORS["robot"])
     lower.set(xlabel="time [s]", ylabel="shaft off fulcrum [mm]", ylim=(0, None))
     return figure
 
@@ -109,11 +106,10 @@ def virtual_force(run: Any) -> Figure:
     """The geometry of the virtual force (Figure 5) where R came closest to O."""
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
-    index = int(run.matrix("clearance")[:, 0].argmin())
-    tool = run.matrix("robot.tool")[index] * MM
-    p_WP, p_WG = tool[3:], tool[:3]
-    p_WO = run.matrix("obstacle.shaft")[index, :3] * MM
-    p_WS = run.matrix("target.shaft")[index, :3] * MM
+    index = int(run.clearance.obstacle.argmin())
+    p_WP, p_WG = (p[index] * MM for p in (run.robot.tool.tip, run.robot.tool.fulcrum))
+    p_WO = run.obstacle.shaft.tip[index] * MM
+    p_WS = run.target.shaft.tip[index] * MM
     p_WGO = _fulcrum(run, "obstacle") * MM
     M_R, M_O = map(
         np.array,
@@ -127,7 +123,7 @@ def virtual_force(run: Any) -> Figure:
         axes, p_WG, p_WS, color=COLORS["target"], lw=1.5, ls="--", label="target line"
     )
     _shaft(axes, M_R, M_O, color="k", lw=1.2, ls=":", label="distance rho")
-    v_1 = run.matrix("planner.v1")[index]
+    v_1 = run.planner.v1.v[index]
     to_goal = M_Rf - M_R
     size = 20.0
     for vector, color, label in (

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from diagrams.resection.scenario import plan_operation
 from plants.tissue.space import SOLID
 from plants.tissue.volume import BRAIN, CRITICAL
 
@@ -28,8 +27,7 @@ def outside_depth(volume: Any) -> float:
 
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
-    operation = plan_operation(run.scenario)
-    session, reach = operation.session, operation.reach
+    session, reach = run.case.session, run.case.reach
     removed = run.matrix("tissue.removed")[-1]
     hits, nearest = run.matrix("tissue.touched")[-1]
     tool, reference = run.matrix("snake.tool"), run.matrix("tip.reference")
@@ -50,14 +48,14 @@ def measure(run: Any) -> dict[str, Any]:
         "body_collisions": int(hits),
         "procedures": sum(step.kind not in ("home", "finish") for step in steps),
         "finishes": sum(step.kind == "finish" for step in steps),
-        "planning_time": operation.planning_time,
+        "planning_time": run.case.planning_time,
         "reach_time": reach.time,
-        "execution_time": carving_of(run).done.time + run.simulated,
-        "resumed_at": carving_of(run).done.time,
+        "execution_time": run.case.done.time + run.simulated,
+        "resumed_at": run.case.done.time,
         "path_length": float(run.signals["tissue.way"][-1]),
         "max_tool_error": float(error.max()),
         "rms_tool_error": float(np.sqrt(np.mean(error**2))),
-        "refusals": operation.refusals,
+        "refusals": run.case.refusals,
         "unreached": [
             {"volume": lump.volume, "where": lump.where, "reason": lump.reason}
             for lump in reach.lumps[:12]

@@ -7,15 +7,16 @@ from typing import Any
 from diagrams.common.study import Study, View, cenic
 from diagrams.resection.diagram import make_resection_diagram
 from diagrams.resection.metrics import measure
+from diagrams.resection.operation import (
+    LOG_PERIOD,
+    Operation,
+    length,
+    outline,
+    prepare,
+)
 from diagrams.resection.plots import plots
 from diagrams.resection.replay import decorate
-from diagrams.resection.scenario import (
-    LOG_PERIOD,
-    ResectionScenario,
-    check,
-    length,
-    plan_operation,
-)
+from diagrams.resection.scenario import ResectionScenario, check
 from plants.tissue.execution import save_execution
 from systems.common.archive import beside
 
@@ -40,11 +41,11 @@ SAVE_EVERY = 5.0
 """Least wall time in s between two savings of what has been carried out."""
 
 
-def keep(scenario: ResectionScenario, station: Any, context: Any, ended: bool) -> None:
+def keep(case: Operation, station: Any, context: Any, ended: bool) -> None:
     """Saves what has been carried out, beside the session's file if it has one."""
-    if not scenario.session:
+    if not case.scenario.session:
         return
-    file = beside(Path(scenario.session), "executed")
+    file = beside(Path(case.scenario.session), "executed")
     if not ended and file.is_file() and time() - file.stat().st_mtime < SAVE_EVERY:
         return
     player = station.GetSubsystemByName("procedure_player")
@@ -53,7 +54,7 @@ def keep(scenario: ResectionScenario, station: Any, context: Any, ended: bool) -
         player.GetMyContextFromRoot(context)
     )
     done = carver.execution(carver.GetMyContextFromRoot(context), int(posture[0]))
-    save_execution(file, done, plan_operation(scenario).session.postures)
+    save_execution(file, done, case.session.postures)
 
 
 STUDY = Study(
@@ -72,6 +73,8 @@ STUDY = Study(
     frame_rate=10.0,
     length=length,
     keep=keep,
+    prepare=prepare,
+    outline=outline,
     replay_length=45.0,
 )
 """The resection of a tumour."""

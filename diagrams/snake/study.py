@@ -75,7 +75,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
 STUDY = Study(
     name="snake",
     scenario=SnakeScenario,
-    make_diagram=make_snake_diagram,
+    make_diagram=lambda case: make_snake_diagram(case.scenario),
     check=check,
     measure=measure,
     signals=SIGNALS,

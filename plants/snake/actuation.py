@@ -21,15 +21,15 @@ from functools import lru_cache
 import math
 from typing import Any
 
-from numba import njit
 import numpy as np
 from numpy.typing import ArrayLike
 
 from plants.snake.kinematics import Array, postures
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
+from systems.common.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def length_of_norm(p: float, R: float, e: float, h: float) -> float:
     """Length L_i in one module for p = ||P_i P'_i||, (2) and (3) (compiled)."""
     d = h - e / 2
@@ -39,7 +39,7 @@ def length_of_norm(p: float, R: float, e: float, h: float) -> float:
     return 4 * h + 4 * R * arc
 
 
-@njit(cache=True)
+@compiled
 def norm_of_length(L: float, R: float, e: float, h: float) -> float:
     """Inverse of `length_of_norm`; NaN for a length that no wire has (compiled)."""
     if 4 * h >= L:
@@ -51,7 +51,7 @@ def norm_of_length(L: float, R: float, e: float, h: float) -> float:
     return 2 * math.sqrt(R * R + d * d) * math.sin(angle)
 
 
-@njit(cache=True)
+@compiled
 def _lengths(q: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
     x = np.empty(3)
     for i in range(q.shape[0]):
@@ -61,13 +61,13 @@ def _lengths(q: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
             add_module(x, rows, m, R, e, h, 1.0, L[i])
 
 
-@njit(cache=True)
+@compiled
 def _half_turn(alpha: float, beta: float, x: Any) -> None:
     s = math.sin(beta / 2)
     x[0], x[1], x[2] = math.cos(beta / 2), s * math.cos(alpha), s * math.sin(alpha)
 
 
-@njit(cache=True)
+@compiled
 def add_module(
     x: Any, rows: Any, m: int, R: float, e: float, h: float, sign: float, L: Any
 ) -> None:
@@ -77,7 +77,7 @@ def add_module(
         L[w] += sign * length_of_norm(p, R, e, h)
 
 
-@njit(cache=True)
+@compiled
 def _bends(
     L: Any, rows: Any, inverse: Any, R: float, e: float, h: float, q: Any, residual: Any
 ) -> None:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from numba import njit
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -11,9 +10,10 @@ from plants.snake.drive import SnakeDriveParams
 from plants.snake.kinematics import Array
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
 from plants.snake.tension import length_gradients
+from systems.common.compiled import compiled
 
 
-@njit  # not cached: numba would not notice changes in the files it calls into
+@compiled
 def _pull(
     ab: Any,
     ab_rate: Any,

@@ -1,15 +1,15 @@
 """The search behind the inverse kinematics, compiled.
 
 Everything works on one pose at a time, in plain numbers; see `inverse_kinematics`
-for what is solved. All of it stands in one file because numba's cache notices
-changes of that file alone.
+for what is solved.
 """
 
 import math
 from typing import Any
 
-from numba import njit
 import numpy as np
+
+from systems.common.compiled import compiled
 
 REACHED = 0
 BEND = 1  # outside the reach of modules 1 and 2 whatever the translation
@@ -21,7 +21,7 @@ SLACK = 1e-9
 """Limits are kept to this many rad, and m, so that poses on them are reached."""
 
 
-@njit(cache=True)
+@compiled
 def half_bend(w: float, kappa: float, t_max: float) -> float:
     """Solves sin(b) (1 + kappa cos(b)) = w for t = tan(b/2), at most t_max.
 
@@ -45,7 +45,7 @@ def half_bend(w: float, kappa: float, t_max: float) -> float:
     return min(t, t_max)
 
 
-@njit(cache=True)
+@compiled
 def _middle_axis(k: float, x: float, y: float, n: Any, t_max: float) -> Any:
     """Axis v for a given k = cos(beta2), its error v . n - (2 k^2 - 1), and t1.
 
@@ -61,7 +61,7 @@ def _middle_axis(k: float, x: float, y: float, n: Any, t_max: float) -> Any:
     return vx * n[0] + vy * n[1] + vz * n[2] - (2 * k * k - 1), vx, vy, vz, t, w
 
 
-@njit(cache=True)
+@compiled
 def _turn_back(alpha: float, beta: float, n: Any) -> Any:
     """Azimuth and bend, per ball, that take a module's end axis to n.
 
@@ -75,7 +75,7 @@ def _turn_back(alpha: float, beta: float, n: Any) -> Any:
     return math.atan2(y, x), math.atan2(math.hypot(x, y), z) / 2
 
 
-@njit(cache=True)
+@compiled
 def _stroke(travel: Any, q: Any) -> int:
     """The status of a translation; one within SLACK is put on its limit."""
     if q[0] < travel[0] - SLACK:
@@ -86,7 +86,7 @@ def _stroke(travel: Any, q: Any) -> int:
     return REACHED
 
 
-@njit(cache=True)
+@compiled
 def _positioning(p: Any, n: Any, h: float, bend: float, travel: Any, q: Any) -> int:
     """Writes (s, alpha1, beta1, alpha2, beta2) to q; returns the status."""
     t_max = math.tan((bend + SLACK) / 2)
@@ -141,7 +141,7 @@ def _positioning(p: Any, n: Any, h: float, bend: float, travel: Any, q: Any) -> 
     return _stroke(travel, q)
 
 
-@njit(cache=True)
+@compiled
 def solve_positionings(
     p: Any, n: Any, h: float, bend: float, travel: Any, q: Any, status: Any
 ) -> None:
@@ -154,7 +154,7 @@ def solve_positionings(
         status[i] = _positioning(p[i], n[i], h, bend, travel, q[i])
 
 
-@njit(cache=True)
+@compiled
 def solve_tools(
     p: Any,
     n: Any,

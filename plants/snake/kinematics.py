@@ -7,18 +7,17 @@ not on its plate (O0 at distance s along z; O3 lies 2 h past the last ball). T i
 the tool, `tool_offset` past O3 along its z.
 
 All functions take one posture or an array of them (the last axis is the posture)
-and broadcast. The heavy ones are compiled; calling them from compiled code of
-your own is welcome, but a cache of such code does not notice changes here.
+and broadcast. The heavy ones are compiled, and can be called from compiled code.
 """
 
 from collections.abc import Sequence
 from typing import Any
 
-from numba import njit
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from plants.snake.parameters import SnakeParams
+from systems.common.compiled import compiled
 
 Array = NDArray[np.float64]
 
@@ -73,7 +72,7 @@ def from_universal(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
     return np.arctan2(y, x), np.arctan2(np.hypot(x, y), np.cos(a) * np.cos(b))
 
 
-@njit(cache=True)
+@compiled
 def advance(R: Any, p: Any, alpha: float, beta: float, h: float) -> None:
     """Moves the frame (R, p) to the end of a module, in place (compiled)."""
     ca, sa = np.cos(alpha), np.sin(alpha)
@@ -92,7 +91,7 @@ def advance(R: Any, p: Any, alpha: float, beta: float, h: float) -> None:
         R[i, 2] = s2 * t + c2 * z
 
 
-@njit(cache=True)
+@compiled
 def _forward(q: Any, h: float, tool: float, X: Any) -> None:
     R, p = np.empty((3, 3)), np.empty(3)
     for i in range(q.shape[0]):
@@ -109,7 +108,7 @@ def _forward(q: Any, h: float, tool: float, X: Any) -> None:
         X[i, 3, 3] = 1.0
 
 
-@njit(cache=True)
+@compiled
 def _centreline(q: Any, h: float, tool: float, out: Any) -> None:
     R, p = np.empty((3, 3)), np.empty(3)
     for i in range(q.shape[0]):

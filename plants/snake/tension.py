@@ -9,7 +9,6 @@ run through, so module 3 comes first.
 
 from typing import Any
 
-from numba import njit
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,9 +16,10 @@ from plants.snake.actuation import norm_rows
 from plants.snake.jacobian import universal_jacobian
 from plants.snake.kinematics import Array, postures
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
+from systems.common.compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def length_gradients(
     a: float, b: float, rows: Any, R: float, h: float, e: float, J: Any
 ) -> None:
@@ -40,7 +40,7 @@ def length_gradients(
         J[w, 1] = slope * (k0 * c_b + k1 * xi_b + k2 * eta_b)
 
 
-@njit(cache=True)
+@compiled
 def _tensions(
     ab: Any, tau: Any, rows: Any, R: float, h: float, e: float, least: float, T: Any
 ) -> None:

@@ -4,19 +4,19 @@ from collections.abc import Sequence
 import math
 from typing import Any
 
-from numba import njit
 import numpy as np
 from numpy.typing import NDArray
 
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import MODULES, SnakeParams
+from systems.common.compiled import compiled
 
 BALLS = 2 * MODULES
 GRAVITY = (0.0, 0.0, -9.81)
 """In W, in m/s2; the channel points up in the plant's world."""
 
 
-@njit(cache=True)
+@compiled
 def _weight(
     x: Any, h: float, tool: float, ball: float, plate: float, ring: float, g: Any
 ) -> Any:

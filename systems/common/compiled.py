@@ -10,26 +10,26 @@ stay in registers) and a block's parameters as `packed` has them. It is compiled
 its first call for the types it gets and cached on disk.
 """
 
+import ast
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 import hashlib
+from importlib.util import find_spec
 import inspect
+import marshal
 from pathlib import Path
 import sys
+from types import CodeType, FunctionType
 from typing import Any
 
 import numba
 from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
-from numba.core.dispatcher import Dispatcher
 from numba.core.event import Listener, install_listener
 import numpy as np
 
 type Numbers = Sequence[float] | np.ndarray
 """An array or a tuple of floats."""
-
-_sources: dict[str, frozenset[str]] = {}
-"""Every file with compiled functions, and the files that its functions call into."""
 
 
 def compiled[F: Callable[..., Any]](function: F) -> F:
@@ -38,16 +38,11 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     Division by zero gives an infinity or NaN, as in numpy, and the blocks test for
     them; hence no `fastmath`, which would take them for impossible.
     """
-    own = function.__code__.co_filename
-    called = {own} | _sources.get(own, frozenset())
-    for value in function.__globals__.values():
-        if isinstance(value, Dispatcher):
-            called |= _sources.get(value.py_func.__code__.co_filename, frozenset())
-    _sources[own] = frozenset(called)
     before = numba.config.CACHE_LOCATOR_CLASSES
     numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.InTree,{__name__}.UserWide"
+    filed = Path(function.__code__.co_filename).is_file()  # not in a notebook
     try:
-        result: Any = numba.njit(cache=True, error_model="numpy")(function)
+        result: Any = numba.njit(cache=filed, error_model="numpy")(function)
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = before
     return result
@@ -91,30 +86,130 @@ def announced() -> AbstractContextManager[Any]:
     return install_listener("numba:compile", _Announcer())
 
 
-@cache
-def _stamp(files: frozenset[str]) -> str:
-    contents = b"".join(Path(file).read_bytes() for file in sorted(files))
-    return hashlib.sha256(contents).hexdigest()
+_FOREIGN = sys.stdlib_module_names | {"numba", "numpy"}
+"""Packages that are not looked into."""
 
 
-class InTree(InTreeCacheLocator):
-    """A cache beside the source that also notices a change in a called file.
+def rehearse(act: Callable[[], Any]) -> None:
+    """Acts once and forgets it, before a clock runs.
 
-    numba's own looks at the calling function's file alone, and would go on using
-    what it inlined from a file that has changed since.
+    Kernels are compiled at their first call, or loaded from the disk: that is no part
+    of the time that the act takes. An error will come again in the act itself.
     """
+    with announced(), suppress(Exception, SystemExit):
+        act()
+
+
+@cache
+def _file(module: str) -> str:
+    """A module's source file; "" if it is no module, or a foreign one."""
+    if not module or module.split(".")[0] in _FOREIGN:
+        return ""
+    try:
+        spec = find_spec(module)
+    except ModuleNotFoundError:  # a name in a module, which is no package
+        return ""
+    origin = str(spec and spec.has_location and spec.origin)
+    return origin if origin.endswith(".py") else ""
+
+
+class _Source:
+    """A source file: its digest, and the names that each of its names is made of."""
+
+    def __init__(self, content: bytes) -> None:
+        self.digest = hashlib.sha256(content).digest()
+        self.words: dict[str, frozenset[str]] = {}
+        self.imports: dict[str, set[str]] = {}
+        for part in ast.parse(content).body:
+            nodes = list(ast.walk(part))
+            words = {getattr(n, "id", getattr(n, "attr", "")) for n in nodes}
+            if isinstance(part, ast.FunctionDef | ast.ClassDef):
+                nodes = [ast.Name(part.name, ast.Store())]
+            for node in nodes:
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                    self.words[node.id] = self.words.get(node.id, frozenset()) | words
+                elif isinstance(node, ast.Import | ast.ImportFrom):
+                    of = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+                    for n in node.names:
+                        bound = (n.asname or n.name).split(".")[0]
+                        self.imports.setdefault(bound, set()).add(of + n.name)
+
+
+@cache
+def _source(file: str, changed: int) -> _Source:
+    return _Source(Path(file).read_bytes())
+
+
+def _words(code: CodeType) -> frozenset[str]:
+    inner = [_words(c) for c in code.co_consts if isinstance(c, CodeType)]
+    return frozenset(code.co_names).union(*inner)
+
+
+def _origins(function: FunctionType) -> list[tuple[str, frozenset[str]]]:
+    """Files, and the names in them that a function begins with."""
+    words = _words(function.__code__) | {function.__name__}
+    found = [(function.__code__.co_filename, words)]
+    names = function.__globals__
+    if names is not vars(sys.modules[function.__module__]):  # it is generated
+        values: list[Any] = [names.get(word) for word in words]
+        for value in values:
+            value = getattr(value, "py_func", value)
+            if isinstance(value, FunctionType) and value is not function:
+                found += _origins(value)
+            elif hasattr(value, "_fields"):
+                found.append((inspect.getfile(value), frozenset({value.__name__})))
+    return found
+
+
+def _stamp(function: FunctionType) -> str:
+    """A fingerprint of all files that a function is made of.
+
+    They are its own and those of the functions, constants and types that it names,
+    and so on. numba's own stamp is of the first alone: it would go on using what was
+    inlined from a file that has changed since. Imports are absolute, as everywhere.
+    """
+    new = _origins(function)
+    seen, sources = set(new), {}
+    for file, words in new:
+        if file not in sources:
+            sources[file] = _source(file, Path(file).stat().st_mtime_ns)
+        for word in words:
+            found = [(file, sources[file].words.get(word, frozenset()))]
+            for target in sources[file].imports.get(word, ()):
+                above, _, name = target.rpartition(".")
+                if _file(target):
+                    found.append((_file(target), words))
+                elif _file(above):
+                    found.append((_file(above), frozenset({name})))
+            new += [one for one in found if one not in seen]
+            seen.update(found)
+    digests = b"".join(sources[file].digest for file in sorted(sources))
+    return hashlib.sha256(digests).hexdigest()
+
+
+class _Stamped:
+    """A place for a function's compiled code that notices a change in any callee."""
+
+    def __init__(self, *function_and_file: Any) -> None:
+        super().__init__(*function_and_file)
+        self._function = function_and_file[0]
 
     def get_source_stamp(self) -> str:
-        """A fingerprint of the function's file and of all files it calls into."""
-        return _stamp(_sources[self._py_file])
+        """The fingerprint of all that the function is made of."""
+        return _stamp(self._function)
+
+    def get_disambiguator(self) -> str:
+        """Tells functions of a file apart, also those made with `exec`."""
+        code = marshal.dumps(self._function.__code__, 2)
+        return hashlib.sha256(code).hexdigest()[:12]
 
 
-class UserWide(UserWideCacheLocator):
-    """The same in the user's cache folder, for an installation that is read-only."""
+class InTree(_Stamped, InTreeCacheLocator):
+    """A cache beside the source."""
 
-    def get_source_stamp(self) -> str:
-        """A fingerprint of the function's file and of all files it calls into."""
-        return _stamp(_sources[self._py_file])
+
+class UserWide(_Stamped, UserWideCacheLocator):
+    """One in the user's cache folder, for an installation that is read-only."""
 
 
 def packed(params: Any = None, **more: Any) -> np.ndarray:

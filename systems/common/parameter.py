@@ -95,6 +95,11 @@ def parameter(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
     return field(default=default, metadata=metadata)
 
 
+def part(kind: type) -> Any:
+    """A field of a dataclass that holds parameters of another."""
+    return field(default_factory=kind)
+
+
 def _copy(value: Any) -> Any:
     return [_copy(item) for item in value] if isinstance(value, list) else value
 
@@ -157,11 +162,12 @@ def _refuse(key: str, value: Any, told: Any, expected: str, default: Any) -> Non
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a scenario: its whole name, what it may be, its value."""
+    """A key of a scenario: its whole name, what it may be, its value and default."""
 
     name: str
     parameter: Parameter
     value: Any
+    default: Any
 
 
 def keys(params: Any, owner: str = "") -> Iterator[Key]:
@@ -173,4 +179,5 @@ def keys(params: Any, owner: str = "") -> Iterator[Key]:
         for part, item in parts:
             yield from keys(item, part)
         if "parameter" in declared.metadata and not is_dataclass(value):
-            yield Key(key, declared.metadata["parameter"], None if parts else value)
+            told, default = declared.metadata["parameter"], default_of(declared)
+            yield Key(key, told, None if parts else value, default)

@@ -12,7 +12,7 @@ columns of the log, and the tuple itself: compiled functions take it (`guide.M_R
 `view` gives the same names to arrays.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite
@@ -112,6 +112,12 @@ def columns(signal: Any) -> tuple[str, ...]:
     return tuple(column for name, field in named for column in field.names(name))
 
 
+def vector(values: Iterable[float]) -> Vector:
+    """Three numbers as compiled functions take them."""
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
 def example(signal: Any) -> Any:
     """The signal with the examples of its fields."""
     if isinstance(signal, Many):
@@ -146,6 +152,11 @@ def view(signal: Any, array: np.ndarray) -> Any:
     return signal(*parts)
 
 
+def rows(many: Many, array: np.ndarray) -> list[Any]:
+    """The rows of an array of many things, each of numbers only, as their signals."""
+    return [*map(many.signal._make, array.reshape(len(many.names), -1).tolist())]
+
+
 def reading(signal: Any, array: str, first: int = 0) -> str:
     """Source of the expression that makes the signal of an array's elements."""
     parts = []
@@ -170,6 +181,14 @@ def reader(signal: Any) -> Any:
     name = f"read_{signal.__name__}"
     source = f"def {name}(values):\n    return {reading(signal, 'values')}\n"
     return generated(source, name, signal, {signal.__name__: signal})
+
+
+def row_writer(signal: Any) -> Any:
+    """A compiled function that writes the signal into a row of an array."""
+    name = f"write_{signal.__name__}_row"
+    parts = enumerate(elements(signal, "value"))
+    body = "".join(f"    rows[i, {k}] = {part}\n" for k, part in parts)
+    return generated(f"def {name}(rows, i, value):\n{body}", name, signal, {})
 
 
 def finiteness(signal: Any) -> Any:

@@ -85,7 +85,11 @@ class Permission(NamedTuple):
     """What the passive wrist allows the task."""
 
     speed_scale: Annotated[float, Field("1", "share of its speed, 0 to stand", 1.0)]
-    code: Annotated[float, Field("1", "why it stands, a key of REASONS, or 0", 0.0)]
+    code: Annotated[float, Field("1", "why it stands: a `Stop`", 0.0)]
+
+
+FREE = Permission(1.0, 0.0)
+"""What the passive wrist permits where there is none."""
 
 
 class Point(NamedTuple):
@@ -147,6 +151,7 @@ finite_estimate = finiteness(Estimate)
 finite_guide = finiteness(Guide)
 finite_tool = finiteness(RobotTool)
 finite_cone = finiteness(ViewCone)
+finite_permission = finiteness(Permission)
 
 
 @compiled

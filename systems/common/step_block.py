@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 import hashlib
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -107,7 +108,7 @@ class StepBlock(Block):
             outputs: Ports and their signals.
             period: In s.
             timed: Whether the step depends on the time.
-            defaults: Values of ports that need not be connected; they come last.
+            defaults: Values of ports that need not be connected.
         """
         kind = _kind(state)
         gives = [kind, *outputs.values()]
@@ -116,10 +117,8 @@ class StepBlock(Block):
         )
         self.DeclareDiscreteState(_array(state))
         shared = self.cached("step", run, tickets | {self.xd_ticket()})
-        first = last = length(kind)
-        for name, signal in outputs.items():
-            self._emit(shared, name, signal, first)
-            first += length(signal)
+        last = length(kind)
+        self._emit(shared, outputs, last)
         self.update_every(period, lambda context: shared.Eval(context)[:last])
 
     def declare_update(
@@ -142,7 +141,7 @@ class StepBlock(Block):
                 a name that begins with `_` there is no port.
             period: In s.
             timed: Whether the update depends on the time.
-            defaults: Values of ports that need not be connected; they come last.
+            defaults: Values of ports that need not be connected.
         """
         kinds = [_kind(state) for state in states.values()]
         run, _ = self._runner(
@@ -153,11 +152,36 @@ class StepBlock(Block):
                 self.DeclareDiscreteState(_array(state))
             else:
                 self.state_out(name, kind, _array(state))
-        ends = np.cumsum([length(kind) for kind in kinds])[:-1]
-        self.update_every(
-            period,
-            run if len(kinds) == 1 else lambda context: np.split(run(context), ends),
+        ends = np.cumsum([length(kind) for kind in kinds]).tolist()
+        parts = [slice(*pair) for pair in pairwise([0, *ends])]
+
+        def of_context(context: Any) -> list[np.ndarray]:
+            array = run(context)
+            return [array[part] for part in parts]
+
+        self.update_every(period, run if len(kinds) == 1 else of_context)
+
+    def declare_map(
+        self,
+        function: Callable[..., Any],
+        constants: Sequence[np.ndarray],
+        inputs: Mapping[str, Any],
+        output: str,
+        signal: Any,
+    ) -> None:
+        """Declares ports, of which one is a map of the others: no state, no time.
+
+        Args:
+            function: Returns the output, as a tuple of one; see `wired`.
+            constants: Records of constants, as `packed` makes them.
+            inputs: Ports and their signals.
+            output: The port of the output.
+            signal: Its signal.
+        """
+        run, tickets = self._runner(
+            function, constants, [], inputs, [signal], False, {}
         )
+        self.signal_out(output, signal, run, tickets)
 
     def _runner(
         self,
@@ -170,39 +194,43 @@ class StepBlock(Block):
         defaults: Mapping[str, Any],
     ) -> tuple[Callable[[Any], np.ndarray], set[Any]]:
         """The step as a function of the context, and the tickets of what it reads."""
-        if list(inputs)[len(inputs) - len(defaults) :] != list(defaults):
-            raise ValueError("inputs with a default come last, in the same order")
         run = wired(step, len(constants), states, list(inputs.values()), gives, timed)
         ports = {name: self.signal_in(name, inputs[name]) for name in inputs}
-        always = [port for name, port in ports.items() if name not in defaults]
-        may_be = [(ports[name], flat(value)) for name, value in defaults.items()]
+        reads = [_reader(ports[name], defaults.get(name)) for name in inputs]
         groups = range(len(states))
 
         def of_context(context: Any) -> np.ndarray:
             time = (context.get_time(),) if timed else ()
-            told = [
-                port.Eval(context) if port.HasValue(context) else value
-                for port, value in may_be
-            ]
             return run(
                 *constants,
                 *[context.get_discrete_state(group).value() for group in groups],
                 *time,
-                *[port.Eval(context) for port in always],
-                *told,
+                *[read(context) for read in reads],
             )
 
         tickets = {port.ticket() for port in ports.values()}
         return of_context, tickets | ({self.time_ticket()} if timed else set())
 
-    def _emit(self, shared: Any, name: str, signal: Any, first: int) -> None:
-        last = first + length(signal)
-        self.signal_out(
-            name,
-            signal,
-            lambda context: shared.Eval(context)[first:last],
-            {shared.ticket()},
-        )
+    def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
+        """Declares outputs that are the shared array's parts from `first` on."""
+        for name, signal in outputs.items():
+            last = first + length(signal)
+
+            def part(context: Any, first: int = first, last: int = last) -> np.ndarray:
+                array: np.ndarray = shared.Eval(context)
+                return array[first:last]
+
+            self.signal_out(name, signal, part, {shared.ticket()})
+            first = last
+
+
+def _reader(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
+    """What reads a port; its default, if it has one, where it is not connected."""
+    read: Callable[[Any], np.ndarray] = port.Eval
+    if default is None:
+        return read
+    is_told, instead = port.HasValue, flat(default)
+    return lambda context: read(context) if is_told(context) else instead
 
 
 def _kind(state: Any) -> Any:

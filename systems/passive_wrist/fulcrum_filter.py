@@ -11,6 +11,7 @@ from math import cos, exp, log, pi, sin
 
 import numpy as np
 
+from systems.common.compiled import rehearse
 from systems.passive_wrist import fulcrum_kernels as kernels
 from systems.passive_wrist.fulcrum_step import to_first_force
 from systems.passive_wrist.wall_model import Vector
@@ -203,7 +204,7 @@ class FulcrumFilter:
         self.parts = [6 * k + 3 for k in range(params.harmonics)]
         for i in (0, *self.parts):
             self.total[:, i : i + 3] = np.eye(3)
-        kernels.warm_up(self.n)
+        rehearse(lambda: kernels.call_all(self.n))
         p = params
         self._noise = np.array(
             [p.force_noise, p.moment_noise, p.force_bias, p.moment_bias, p.pose_noise]

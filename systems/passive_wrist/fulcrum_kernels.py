@@ -268,8 +268,8 @@ def spread(P: Floats, u: Floats, bias: float) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=4)
-def warm_up(n: int) -> None:
-    """Compiles all kernels, or loads them, before a clock runs.
+def call_all(n: int) -> None:
+    """Calls every kernel once, for a rehearsal.
 
     Args:
         n: Number of states.

@@ -24,8 +24,8 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
 from diagrams.snake.scenario import ELASTIC_STEP
+from diagrams.studies import load_scenario
 from plants.snake.actuation import bends_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.inverse_kinematics import positioning, tool_postures
@@ -327,7 +327,3 @@ def report(seed: int = 1, scenes: int = 0) -> str:
     if importlib.util.find_spec("mujoco") is None:
         lines += ["", "MuJoCo is not installed: pip install 'trocar[peers]'"]
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(report())

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from systems.common.geometry import sub, unit, xyz
+from systems.common.geometry import sub, unit
+from systems.common.signals import Estimate
 from systems.sensing import trajectory_estimator
 from systems.sensing.optical_tracker import OpticalTrackerParams, disturb
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
@@ -12,7 +13,7 @@ from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 def tracked(
     seed: int, number: int, wall_height: float
-) -> Callable[[float, np.ndarray], np.ndarray]:
+) -> Callable[[float, Estimate], Estimate]:
     """A tracker and an estimator with their defaults, for one scene.
 
     A frame is delivered a period after its exposure (latency 14.2 ms), with the noise
@@ -24,7 +25,7 @@ def tracked(
         wall_height: Of the abdominal wall where O enters, m; known to within 10 mm.
 
     Returns:
-        A function of the time and the exact estimate (17) that gives the estimate (17).
+        A function of the time and the exact estimate that gives the estimate.
     """
     rng = np.random.default_rng([seed, 13, number])
     body = OpticalTrackerParams().body
@@ -33,10 +34,10 @@ def tracked(
     state = trajectory_estimator.initial(params)
     frames: list[np.ndarray] = []
 
-    def sense(time: float, exact: np.ndarray) -> np.ndarray:
+    def sense(time: float, exact: Estimate) -> Estimate:
         nonlocal state
-        p = xyz(exact, 0)
-        shaft = p + unit(sub(p, xyz(exact, 9)))
+        p = exact.p
+        shaft = p + unit(sub(p, exact.fulcrum))
         seen = disturb(
             shaft,
             rng.standard_normal(6),

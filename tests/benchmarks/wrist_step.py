@@ -1,7 +1,7 @@
 """What one control step of the wrist costs: estimator and emulation together.
 
-`python -m tests.benchmarks.wrist_step` runs `pwe_breathing` and prints the median
-wall time that the two blocks take in the loop, without the plant's own work.
+The median wall time that the two blocks take in the loop of `pwe_breathing`, without
+the plant's own work.
 """
 
 from collections import defaultdict
@@ -11,7 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator
 from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
 
@@ -55,7 +55,3 @@ def report(seed: int, scenes: int) -> str:
         f"{1e3 / 120:.1f} ms; {len(walls)} steps, real-time factor "
         f"{run.metrics['real_time_factor']:.1f}"
     )
-
-
-if __name__ == "__main__":
-    print(report(1, 0))

@@ -122,7 +122,7 @@ def test_the_module_is_the_command_line_and_teaches():
 
 def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     from diagrams.common.run import run_scenario
-    from diagrams.common.scenario import load_scenario
+    from diagrams.studies import load_scenario
     from systems.motion.endoscope import Endoscope
 
     follow = Endoscope._update

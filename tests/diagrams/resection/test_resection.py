@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from diagrams.common.cli import main
-from diagrams.common.run import run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
-from diagrams.resection.scenario import plan_operation
+from diagrams.common.run import prepare, run_scenario, simulate
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import build, load_scenario
 from plants.tissue.execution import Execution, load_execution, save_execution
 from systems.common.archive import beside
 from systems.resection.planning.reach import load_reach
 from systems.resection.planning.session import load_session
+from tests import runs
 
 
 @pytest.fixture(scope="module")
@@ -42,12 +43,58 @@ def test_paper(paper):
 
 
 def test_carving_keeps_up(paper):
+    """Each instant carves what was swept since the one before: a few stamps."""
     run, _ = paper
-    assert run.metrics["real_time_factor"] >= 5.0
+    instants = run.signals["tissue.index"]
+    assert instants[-1] == round(run.simulated / run.scenario.period)
+    carved, way = np.diff(instants), np.diff(run.signals["tissue.way"])
+    assert carved.min() >= 4 and carved.max() <= 6  # in 0.1 s
+    assert (way / carved).max() <= 4 * run.scenario.carver.pitch
+
+
+def test_a_case_runs_the_same_once_more(paper):
+    run, _ = paper
+    case = run.case
+    case.scenario.duration, whole = 3.0, case.scenario.duration
+    again = simulate(case)
+    case.scenario.duration = whole
+    assert again.case is case
+    for name, column in again.signals.items():
+        np.testing.assert_array_equal(column, run.signals[name][: len(column)])
+
+
+def wires(diagram):
+    """All wires of a diagram, by the names of systems and ports."""
+    return {
+        (
+            sink.get_name(),
+            sink.get_input_port(port).get_name(),
+            source.get_name(),
+            source.get_output_port(index).get_name(),
+        )
+        for (sink, port), (source, index) in diagram.connection_map().items()
+    }
+
+
+def test_a_diagram_needs_no_plan(paper, monkeypatch):
+    def planning(*_, **__):
+        raise AssertionError("a diagram that plans")
+
+    for name in ("find_reach", "load_reach", "load_session", "propose_access"):
+        monkeypatch.setattr(f"diagrams.resection.operation.{name}", planning)
+    monkeypatch.setattr("diagrams.resection.operation.Planner.run", planning)
+    planned = paper[0].diagram.GetSubsystemByName("station")
+    for name in ("resect_auto_large", "resect_mask", "resect_paper"):
+        diagram = build(load_scenario(name))
+        assert wires(diagram) == wires(planned)
+        player = diagram.GetSubsystemByName("procedure_player")
+        assert len(player.times) == 1  # at home
+        carver = diagram.GetSubsystemByName("tissue_carver")
+        assert carver.carving.volume.labels.size < 50_000  # a stand-in, made at once
 
 
 def test_refused():
-    run = simulate(load_scenario("resect_refused"))
+    run = runs.run("resect_refused")
     m = run.metrics
     assert [refusal["reason"] for refusal in m["refusals"]] == [
         "tool outside",
@@ -71,18 +118,18 @@ def test_auto_resumes_after_being_killed(tmp_path):
         "resect_auto_small",
         [*coarse, f"session={file}", "planner.target=0.5", "planner.candidates=4"],
     )
-    first = plan_operation(scenario).session
+    first = prepare(scenario).session
     steps = [step.name for step in first.steps]
     scenario.planner.target = 0.9
-    again = plan_operation(scenario).session
+    again = prepare(scenario).session
     assert [step.name for step in again.steps][: len(steps)] == steps
     assert again.fraction > first.fraction
 
 
 def test_auto_small():
-    run = simulate(load_scenario("resect_auto_small"))
+    run = runs.run("resect_auto_small")
     m = run.metrics
-    assert run.wall_time < 300.0
+    assert not run.error and run.simulated < 1200.0
     assert m["reachable_fraction"] >= 0.80
     assert m["resected_fraction"] >= 0.98 * m["reachable_fraction"]
     assert m["healthy_removed"] <= 0.01 * m["tumour_volume"]
@@ -177,7 +224,7 @@ def test_execution_goes_on_after_being_killed(tmp_path):
         child.kill()
     assert child.returncode == -signal.SIGKILL
     scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
-    done = load_execution(executed, plan_operation(scenario).session.postures)
+    done = load_execution(executed, prepare(scenario).session.postures)
     assert 0.0 < done.time < whole.metrics["execution_time"]
     rest = simulate(scenario)
     assert rest.metrics["resumed_at"] == done.time
@@ -192,7 +239,7 @@ def test_execution_goes_on_after_being_killed(tmp_path):
 def test_an_execution_of_another_plan_is_refused(tmp_path):
     file = tmp_path / "s.session"
     scenario = load_scenario("resect_paper", [f"session={file}", "reach_effort=0.05"])
-    postures = plan_operation(scenario).session.postures
+    postures = prepare(scenario).session.postures
     done = Execution(posture=5, tau=np.zeros((2, 2, 2), np.int32))
     save_execution(beside(file, "executed"), done, postures + 0.1)
     with pytest.raises(ScenarioError, match="is of another plan: move it away"):
@@ -205,7 +252,7 @@ def test_an_execution_of_another_plan_is_refused(tmp_path):
 def test_the_reachable_part_is_searched_once(tmp_path):
     file = tmp_path / "s.session"
     scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
-    reach = plan_operation(scenario).reach
+    reach = prepare(scenario).reach
     session = load_session(file)
     again = load_reach(beside(file, "reach"), session, 1, 0.25)
     assert again is not None and again.lumps == reach.lumps

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from diagrams.common.run import run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.snake.plots import plots
+from diagrams.studies import load_scenario
+from tests import runs
 
 
 def test_circle():
@@ -25,8 +27,7 @@ def test_circle():
 
 
 def test_reach():
-    run = simulate(load_scenario("snake_reach"))
-    assert not run.error
+    run = runs.run("snake_reach")
     assert run.metrics["max_pose_error"] <= 1e-3
     assert run.metrics["refused_poses"] == run.metrics["false_alarms"] == 0
     assert (run.matrix("drums.limited") == 0.0).all()

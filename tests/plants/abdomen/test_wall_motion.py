@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from plants.abdomen.wall_motion import WallMotionParams, wave
 
 

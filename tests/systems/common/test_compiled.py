@@ -3,12 +3,15 @@
 from dataclasses import dataclass, field
 import os
 from pathlib import Path
+import re
+import shutil
 import subprocess
 import sys
 import textwrap
 
 import numba
 import numpy as np
+import pytest
 
 from systems.common.compiled import announced, compiled, packed
 
@@ -67,52 +70,201 @@ def test_compilation_is_announced_once_at_a_terminal(capsys, monkeypatch):
     assert not capsys.readouterr().err
 
 
+ROOT = Path(__file__).parents[3]
+
+PACKAGES = {
+    "ground/vectors.py": """
+        @compiled
+        def twice(x):
+            return 2.0 * x
+        """,
+    "ground/sizes.py": """
+        from typing import NamedTuple
+
+        GAIN = 10.0
+
+        class Ball(NamedTuple):
+            radius: float
+            width: float
+        """,
+    "ground/rates.py": """
+        from ground.sizes import GAIN
+
+        RATE = GAIN * 10.0
+        """,
+    "world/kernels.py": """
+        from ground import vectors
+
+        OTHER = 7.0
+
+        @compiled
+        def fourfold(x):
+            return vectors.twice(vectors.twice(x))
+        """,
+    "control/block.py": """
+        from ground import vectors
+        from ground.rates import RATE
+        from ground.sizes import GAIN, Ball
+        from ground.vectors import twice
+        from world.kernels import fourfold
+
+        @compiled
+        def by_name(x):
+            return twice(x) + 1.0
+
+        @compiled
+        def by_module(x):
+            return vectors.twice(x) + 2.0
+
+        @compiled
+        def by_constant(x):
+            return GAIN * x
+
+        @compiled
+        def by_derived_constant(x):
+            return RATE * x
+
+        def width(ball: Ball, x):
+            return ball.width * x
+
+        by_type = compiled(width)
+
+        @compiled
+        def two_files_away(x):
+            return fourfold(x) + 3.0
+
+        exec(compile("def made(x):\\n return GAIN + x", __file__, "exec"))
+        by_exec = compiled(made)
+
+        exec(compile("def made(x):\\n return RATE + x", __file__, "exec"))
+        like_by_exec = compiled(made)
+
+        scope = {"step": fourfold, "__name__": __name__}
+        exec(compile("def given(x):\\n return step(x)", __file__, "exec"), scope)
+        given = compiled(scope["given"])
+
+        @compiled
+        def alone(x, more=0.5):
+            return x + more
+
+        if __name__ == "__main__":
+            for name in (
+                "by_name by_module by_constant by_derived_constant two_files_away "
+                "by_exec like_by_exec given alone"
+            ).split():
+                f = globals()[name]
+                print(name, f(1.0), len(f.stats.cache_hits))
+            f = by_type
+            print("by_type", f(Ball(3.0, 5.0), 1.0), len(f.stats.cache_hits))
+        """,
+}
+
+RESULTS = {
+    "by_name": 3.0,
+    "by_module": 4.0,
+    "by_constant": 10.0,
+    "by_derived_constant": 100.0,
+    "two_files_away": 7.0,
+    "by_exec": 11.0,
+    "like_by_exec": 101.0,
+    "given": 4.0,
+    "alone": 1.5,
+    "by_type": 5.0,
+}
+
+EDITS = [
+    (
+        "ground/vectors.py",
+        ("2.0 * x", "3.0 * x"),
+        {"by_name": 4.0, "by_module": 5.0, "two_files_away": 12.0, "given": 9.0},
+    ),
+    (
+        "ground/sizes.py",
+        ("GAIN = 10.0", "GAIN = 20.0"),
+        {
+            "by_constant": 20.0,
+            "by_derived_constant": 200.0,
+            "by_exec": 21.0,
+            "like_by_exec": 201.0,
+            "by_type": 5.0,
+        },
+    ),
+    (
+        "ground/sizes.py",
+        ("radius: float\n    width: float", "width: float\n    radius: float"),
+        {
+            "by_constant": 20.0,
+            "by_derived_constant": 200.0,
+            "by_exec": 21.0,
+            "like_by_exec": 201.0,
+            "by_type": 3.0,
+        },
+    ),
+    (
+        "world/kernels.py",
+        ("OTHER = 7.0", "OTHER = 8.0"),
+        {"two_files_away": 12.0, "given": 9.0},
+    ),
+]
+
+
+def python(folder: Path, *program: str) -> str:
+    """What a program prints in a process of its own, without Python's own caches."""
+    path = os.pathsep.join([str(folder), str(ROOT)])
+    return subprocess.run(
+        [sys.executable, "-B", *program],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": path},
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+
+
 def test_a_change_in_a_called_file_is_noticed(tmp_path):
-    (tmp_path / "low.py").write_text(
-        textwrap.dedent("""\
-        from systems.common.compiled import compiled
+    for name, source in PACKAGES.items():
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        (file.parent / "__init__.py").touch()
+        decorator = "from systems.common.compiled import compiled\n"
+        file.write_text(decorator + textwrap.dedent(source))
 
-        @compiled
-        def low(x):
-            return x + 1.0
-        """)
+    def run() -> tuple[dict[str, float], set[str]]:
+        """Results, and whose code was made anew."""
+        lines = python(tmp_path, str(tmp_path / "control/block.py")).splitlines()
+        rows = [line.split() for line in lines]
+        return {r[0]: float(r[1]) for r in rows}, {r[0] for r in rows if r[2] == "0"}
+
+    expected = dict(RESULTS)
+    assert run() == (expected, set(expected))
+    assert run() == (expected, set())
+    for name, (old, new), changed in EDITS:
+        file = tmp_path / name
+        assert old in file.read_text()
+        file.write_text(file.read_text().replace(old, new))
+        expected |= changed
+        assert run() == (expected, set(changed)), name
+
+
+def test_the_planner_notices_a_change_in_the_robots_kernels(tmp_path):
+    for room in ("plants", "systems"):
+        skip = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / room, tmp_path / room, ignore=skip)
+    program = (
+        "from systems.resection.planning.growth import grow\n"
+        "from systems.resection.planning.tree import visit\n"
+        "print(*(f._cache._impl.locator.get_source_stamp() for f in (grow, visit)))"
     )
-    (tmp_path / "middle.py").write_text(
-        textwrap.dedent("""\
-        from low import low
-        from systems.common.compiled import compiled
+    before = python(tmp_path, "-c", program).split()
+    with (tmp_path / "plants/snake/inverse_kernels.py").open("a") as stream:
+        stream.write("# Changed.\n")
+    after = python(tmp_path, "-c", program).split()
+    assert before[0] != after[0] and before[1] == after[1]
 
-        @compiled
-        def middle(x):
-            return low(x)
-        """)
-    )
-    (tmp_path / "high.py").write_text(
-        textwrap.dedent("""\
-        from middle import middle
-        from systems.common.compiled import compiled
 
-        @compiled
-        def high(x):
-            return middle(x)
-
-        print(high(1.0), sum(high.stats.cache_hits.values()))
-        """)
-    )
-
-    def run() -> str:
-        root = str(Path(__file__).parents[3])
-        path = os.pathsep.join([str(tmp_path), root])
-        return subprocess.run(
-            [sys.executable, "-B", str(tmp_path / "high.py")],
-            env=os.environ | {"PYTHONPATH": path},
-            check=True,
-            capture_output=True,
-            text=True,
-        ).stdout.split()
-
-    assert run() == ["2.0", "0"]
-    assert run() == ["2.0", "1"]
-    low = (tmp_path / "low.py").read_text()
-    (tmp_path / "low.py").write_text(low.replace("1.0", "2.0"))
-    assert run() == ["3.0", "0"]
+@pytest.mark.parametrize("house", ["systems", "plants", "diagrams"])
+def test_nothing_is_compiled_past_the_decorator(house):
+    raw = re.compile(r"\bn?jit\b")
+    files = [f for f in (ROOT / house).rglob("*.py") if raw.search(f.read_text())]
+    decorator = ROOT / "systems/common/compiled.py"
+    assert files == ([decorator] if house == "systems" else [])

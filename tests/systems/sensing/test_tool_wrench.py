@@ -7,14 +7,17 @@ from pydrake.multibody.math import SpatialForce
 import pytest
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from diagrams.wrist.diagram import make_wrist_diagram
 from systems.sensing import sensor_noise
 from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
 
 QUIET = [
-    f"tool_wrench.{name}=0.0"
-    for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+    "compare=[]",
+    *(
+        f"tool_wrench.{name}=0.0"
+        for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+    ),
 ]
 
 

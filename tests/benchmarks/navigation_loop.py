@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from time import perf_counter
 
+from systems.switching.signals import Seen
 from systems.switching.unicycle_control import UnicycleControlParams, heading_law
-from tests.benchmarks.scenes import Frame, Robot, Scene
-
-Seen = list[tuple[float, float, float, float, float, float]]
-"""Track identity, x, y, radius, v_x, v_y of the obstacles in sight."""
+from tests.benchmarks.navigation_scenes import Frame, Robot, Scene
 
 Command = tuple[float, float, bool]
 """Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
 
-Step = Callable[[float, float, float, float, float, Seen], Command]
+Step = Callable[[float, float, float, float, float, list[Seen]], Command]
 """(x, y, heading, v_x, v_y, obstacles in sight) -> what to do."""
 
 Planner = Callable[[Scene], Step]
@@ -87,7 +85,7 @@ def run(scene: Scene, planner: Planner) -> Result:
     frame: Frame = scene.frames(0)
     for k in range(int(scene.time_limit / dt)):
         seen = [
-            (float(i), a, b, r, u, v)
+            Seen(float(i), a, b, r, u, v)
             for i, (a, b, r, u, v) in enumerate(frame)
             if hypot(a - x, b - y) <= robot.vision
         ]
