@@ -175,7 +175,8 @@ def beside(path: Path, name: str) -> Path:
     """A header's detached data, which must lie in the header's own folder."""
     folder = path.resolve().parent
     data = folder / name
-    if Path(name).name != name or data.resolve().parent != folder:
+    is_name = Path(name).name == name and name.isprintable()
+    if not is_name or data.resolve().parent != folder:
         raise MaskError(
             f"its data file {name[:80]!r}: expected a file in the header's own folder"
         )

@@ -50,7 +50,10 @@ def load_mask(path: str | Path, labels: MaskLabels | None = None) -> Tissue:
             raise MaskError("it is no file")
         return tissue_of(_read_apart(file, wanted), wanted.component, file.name)
     except MaskError as error:
-        raise MaskError(f"mask {str(path)!r}: {error}") from None
+        why = str(error)
+    except OSError as error:
+        why = f"it cannot be read: {error.strerror}"
+    raise MaskError(f"mask {str(path)!r}: {why}")
 
 
 def _read_apart(file: Path, wanted: MaskLabels) -> Labelled:

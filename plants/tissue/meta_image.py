@@ -45,11 +45,11 @@ def read_meta_image(path: Path) -> Image:
     """
     lines, offset = header_lines(path, lambda line: line.startswith("ElementDataFile"))
     fields = _fields(lines)
-    channels = fields.get("ElementNumberOfChannels", "1")
-    if fields["NDims"] != "3" or channels != "1":
+    (axes,) = numbers(fields["NDims"], 1, "NDims")
+    (channels,) = numbers(fields.get("ElementNumberOfChannels", "1"), 1, "Channels")
+    if (axes, channels) != (3, 1):
         raise MaskError(
-            f"it has {fields['NDims'][:9]} axes and {channels[:9]} values a voxel: "
-            "expected 3 and 1"
+            f"it has {axes:g} axes and {channels:g} values a voxel: expected 3 and 1"
         )
     if fields.get("HeaderSize", "0") != "0":
         raise MaskError(f"MetaImage with HeaderSize {fields['HeaderSize'][:9]}")
@@ -65,7 +65,7 @@ def read_meta_image(path: Path) -> Image:
         encoding = "raw"
         if choice(fields.get("CompressedData", "False"), TRUTH, "CompressedData"):
             encoding = "deflated"
-            stored = str(file.stat().st_size - offset)
+            stored = str(max(file.stat().st_size - offset, 0))
             if fields.get("CompressedDataSize", stored) != stored:
                 raise damaged(f"it has {stored} bytes of data, its header differs")
     notes: list[str] = []

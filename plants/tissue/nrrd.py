@@ -79,10 +79,11 @@ def read_nrrd(path: Path) -> Image:
     """
     lines, offset = header_lines(path, lambda line: line == "")
     fields = _fields(lines)
-    if fields["dimension"] != "3":
+    (axes,) = numbers(fields["dimension"], 1, "dimension")
+    if axes != 3:
         raise MaskError(
-            f"it has {fields['dimension'][:9]} axes: expected 3; export overlapping "
-            "segments as one label map"
+            f"it has {axes:g} axes: expected 3; export overlapping segments as one "
+            "label map"
         )
     for key in ("lineskip", "byteskip"):
         if fields.get(key, "0") != "0":

@@ -154,6 +154,8 @@ def test_what_is_no_file(tmp_path):
     os.mkfifo(tmp_path / "p.nrrd")
     with pytest.raises(MaskError, match="it is no file"):
         load_mask(tmp_path / "p.nrrd")
+    with pytest.raises(MaskError, match="cannot be read: File name too long"):
+        load_mask(tmp_path / ("n" * 999 + ".nrrd"))
     link = tmp_path / "zero.nrrd"
     link.symlink_to("/dev/zero")
     with pytest.raises(MaskError, match="it is no file"):
@@ -207,7 +209,9 @@ def test_a_file_that_unpacks_to_more_than_it_says(tmp_path):
         read(path)
 
 
-@pytest.mark.parametrize("name", ["../p.raw", "/etc/hostname", "sub/p.raw", "out.raw"])
+@pytest.mark.parametrize(
+    "name", ["../p.raw", "/etc/hostname", "sub/p.raw", "out.raw", "\0"]
+)
 def test_detached_data_lie_beside_their_header(tmp_path, name):
     (tmp_path / "in").mkdir()
     path = write_mask(tmp_path / "in" / "p.mhd", cube(), compressed=False)
