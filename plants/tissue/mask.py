@@ -11,10 +11,8 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.tissue import mask_reader
+from plants.tissue import mask_labels, mask_reader
 from plants.tissue.image import MaskError
-from plants.tissue.mask_labels import CRITICAL as CRITICAL_LABEL
-from plants.tissue.mask_labels import TUMOUR as TUMOUR_LABEL
 from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.mask_reader import Labelled
 from plants.tissue.tissue import BRAIN, CRITICAL, TUMOUR, Tissue, parts_by_size
@@ -92,7 +90,7 @@ def _read_apart(file: Path, wanted: MaskLabels) -> Labelled:
 def tissue_of(part: Labelled, component: int, name: str) -> Tissue:
     """The tissue of a mask, of whose tumours one is taken."""
     notes = list(part.notes)
-    tumour = part.labels == TUMOUR_LABEL
+    tumour = part.labels == mask_labels.TUMOUR
     numbers, sizes = parts_by_size(tumour)
     voxel = abs(float(np.linalg.det(part.X_PV[:3, :3])))
     chosen = numbers == _chosen(sizes, component)
@@ -112,7 +110,7 @@ def tissue_of(part: Labelled, component: int, name: str) -> Tissue:
         notes.append("the tumour touches the image's border and may be cut off there")
     labels = np.full(tumour.shape, BRAIN, np.uint8)
     labels[chosen] = TUMOUR
-    labels[part.labels == CRITICAL_LABEL] = CRITICAL
+    labels[part.labels == mask_labels.CRITICAL] = CRITICAL
     X_PV = part.X_PV.copy()
     X_PV[:3, 3] += X_PV[:3, :3] @ (np.array(part.corner) - 1)
     padded = np.pad(labels, 1, constant_values=BRAIN)

@@ -44,7 +44,10 @@ class MaskLabels:
         most=1000,
     )
     threshold: float | None = parameter(
-        None, "all from this value on is tumour, of an image that is no label map"
+        None,
+        "all from this value on is tumour, of an image that is no label map",
+        least=-1e6,
+        most=1e6,
     )
     transform: str = parameter(
         AUTO,

@@ -42,6 +42,9 @@ from systems.resection.planning.tree import (
 ROOM = 60_000
 """Nodes, and visits, that one step of a session may need."""
 
+FORMAT = 2
+"""Of a session's file; from 2 on it holds what is critical as the mask has it."""
+
 STARTS = 24
 """Nodes from which a procedure's start is tried."""
 
@@ -309,7 +312,7 @@ class Session:
         if v.critical is not None:
             arrays |= {"critical": v.critical.index, "X_WV": v.critical.X_WV}
         meta = {
-            "format": 1,
+            "format": FORMAT,
             "spacing": v.spacing,
             "channel": v.channel,
             "channel_depth": v.depth,
@@ -332,6 +335,11 @@ def load_session(path: Path) -> Session:
         ValueError: If the file is not there or damaged; the one before is offered.
     """
     meta, arrays = read_archive(path, "session")
+    if meta["format"] != FORMAT:
+        raise ValueError(
+            f"session {str(path)!r} has format {meta['format']}, expected {FORMAT}: "
+            "it was planned by another version; plan it anew"
+        )
     volume = Volume(
         arrays["labels"],
         arrays["origin"],
