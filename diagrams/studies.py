@@ -4,18 +4,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pydrake.common.yaml import yaml_dump, yaml_load_typed
-
 from diagrams.common.case import Case
 from diagrams.common.scenario import (
     ScenarioError,
-    files,
     find_scenario,
     nearest,
     refusals,
 )
 from diagrams.common.study import Study
-from diagrams.common.tree import apply_override, fit, read_tree, require
+from diagrams.common.tree import (
+    apply_override,
+    fit,
+    make,
+    read_tree,
+    require,
+    settle,
+)
 from diagrams.gauze.study import STUDY as GAUZE
 from diagrams.navigation.study import STUDY as NAVIGATION
 from diagrams.resection.study import STUDY as RESECTION
@@ -64,19 +68,19 @@ def load_scenario(
         raise ScenarioError(f"{path}: missing key 'system', e.g. 'system: gauze'")
     study = get_study(tree["system"])
     schema = study.scenario
-    folders = dict.fromkeys(files(schema), path.parent)
+    study.gather(tree)
+    settle(schema, tree, path.parent)
     for text in overrides:
-        folders[apply_override(tree, text)] = Path.cwd()
+        apply_override(tree, text)
     if seed is not None:
         tree["seed"] = seed
     if duration is not None:
         tree["duration"] = duration
+    study.gather(tree)
+    settle(schema, tree, Path.cwd())
     for key in study.required:
         require(tree, key, path)
-    scenario = yaml_load_typed(schema=schema, data=yaml_dump(fit(schema, tree)))
-    for key in files(schema):
-        if getattr(scenario, key):
-            setattr(scenario, key, str(folders[key] / getattr(scenario, key)))
+    scenario = make(schema, fit(schema, tree))
     check_scenario(scenario)
     return scenario
 

@@ -8,8 +8,6 @@ import subprocess
 from hypothesis import settings
 import pytest
 
-from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
-
 settings.register_profile("repeatable", derandomize=True)
 settings.load_profile("repeatable")
 
@@ -25,12 +23,6 @@ CHROMIUM_FLAGS = [
     "--virtual-time-budget=8000",
     "--window-size=1200,800",
 ]
-
-
-@pytest.fixture(scope="session")
-def ball_tissue() -> Tissue:
-    """A ball of 30 mm, 1 mm voxels."""
-    return synthetic_tumour(SyntheticTumour(length=0.03, lobes=0, roughness=0.0))
 
 
 @pytest.fixture(scope="session")

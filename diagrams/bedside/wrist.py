@@ -18,16 +18,10 @@ from systems.common.signals import (
     ShaftMotion,
     Wrench,
 )
-from systems.passive_wrist.fulcrum_estimator import (
-    Covariance,
-    FulcrumEstimator,
-    FulcrumParams,
-)
-from systems.passive_wrist.passive_wrist_emulation import (
-    PassiveWristEmulation,
-    WristParams,
-)
-from systems.passive_wrist.wrist_law import MODES
+from systems.passive_wrist.fulcrum_estimator import Covariance, FulcrumEstimator
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
+from systems.passive_wrist.wrist_law import MODES, WristParams
 from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
 
 WRIST_WIRES = (

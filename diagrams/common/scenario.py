@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 import dataclasses
 from dataclasses import dataclass
 import difflib
@@ -9,7 +10,7 @@ from pathlib import Path
 import shutil
 from typing import Any
 
-from pydrake.common.yaml import yaml_dump_typed
+import yaml
 
 from systems.common.parameter import parameter
 
@@ -43,12 +44,6 @@ class Scenario:
     description: str = parameter("", "one line for `trocar scenarios`")
     duration: float = parameter(10.0, "simulated time", "s", above=0.0, most=1e5)
     seed: int = parameter(0, "of all randomness of the run", least=0, most=2**63 - 1)
-
-
-def files(scenario: Any) -> list[str]:
-    """Names of a scenario's fields, or its class's, that name files."""
-    told = {f.name: f.metadata.get("parameter") for f in dataclasses.fields(scenario)}
-    return [name for name, parameter in told.items() if parameter and parameter.file]
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
@@ -89,14 +84,24 @@ def save_scenario(scenario: Any, folder: Path) -> Path:
     Returns:
         The file; loading it repeats the run.
     """
-    copy = dataclasses.replace(scenario)
-    for field in files(copy):
-        name = getattr(copy, field)
-        if name:
-            target = folder / Path(name).name
-            if target.resolve() != Path(name).resolve():
-                shutil.copyfile(name, target)
-            setattr(copy, field, target.name)
+    copy = deepcopy(scenario)
+    for owner, name in files(copy):
+        source = Path(getattr(owner, name))
+        target = folder / source.name
+        if target.resolve() != source.resolve():
+            shutil.copyfile(source, target)
+        setattr(owner, name, target.name)
     path = folder / "scenario.yaml"
-    path.write_text(yaml_dump_typed(copy))
+    path.write_text(yaml.safe_dump(dataclasses.asdict(copy), sort_keys=False))
     return path
+
+
+def files(params: Any) -> Iterator[tuple[Any, str]]:
+    """Every field that names a file: the dataclass it is in, and its name there."""
+    for field in dataclasses.fields(params):
+        value, told = getattr(params, field.name), field.metadata.get("parameter")
+        if told and told.file and value:
+            yield params, field.name
+        for item in value if isinstance(value, list) else [value]:
+            if dataclasses.is_dataclass(item):
+                yield from files(item)

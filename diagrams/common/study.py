@@ -65,6 +65,7 @@ class Study:
         prepare: Makes the case of a scenario, and shows the progress of it.
         outline: Makes a case that is not prepared: its diagram has the same blocks
             and wires, and is there at once.
+        gather: Puts plain data of a scenario into the form of its dataclass, in place.
         companions: Scenarios to run beside one, by name; those have none.
     """
 
@@ -88,4 +89,5 @@ class Study:
     replay_length: float = math.inf
     prepare: Callable[[Any, Progress], Case] = lambda scenario, progress: Case(scenario)
     outline: Callable[[Any], Case] = Case
+    gather: Callable[[dict[str, Any]], None] = lambda tree: None
     companions: Callable[[Any], dict[str, Any]] = lambda scenario: {}

@@ -13,6 +13,8 @@ import yaml
 from diagrams.common.scenario import ScenarioError, nearest
 
 BOOL = "tag:yaml.org,2002:bool"
+NAMED = "tools"
+"""The list whose items are called by their names."""
 SWITCHES = {"yes": True, "on": True, "no": False, "off": False}
 """Texts that are true or false where that is wanted, and only there."""
 
@@ -78,7 +80,7 @@ def read_tree(path: Path) -> dict[str, Any]:
 
 
 def apply_override(tree: dict[str, Any], text: str) -> str:
-    """Puts `KEY.SUB=VALUE` into the tree; the value is read as YAML.
+    """Puts `KEY.SUB=VALUE` into the tree; the value is read as YAML. Tools are added.
 
     Returns:
         The first part of the key.
@@ -86,18 +88,20 @@ def apply_override(tree: dict[str, Any], text: str) -> str:
     Raises:
         ScenarioError: If the text has no such form.
     """
-    key, equals, value = text.partition("=")
+    key, equals, told = text.partition("=")
     parts = key.strip().split(".")
     if not equals or not all(parts):
         raise ScenarioError(f"--set {text!r}: expected KEY.SUB=VALUE")
-    parsed = read_yaml(f"value: {value}", f"--set {text!r}: {value!r} is no value")
+    parsed = read_yaml(f"value: {told}", f"--set {text!r}: {told!r} is no value")
     node = tree
     for part in parts[:-1]:
         child = node.setdefault(part, {})
         if not isinstance(child, dict):
             raise ScenarioError(f"--set {text!r}: {part!r} has no keys below it")
         node = child
-    node[parts[-1]] = parsed["value"]
+    value, before = parsed["value"], node.get(parts[-1])
+    both = parts == [NAMED] and isinstance(value, list) and isinstance(before, list)
+    node[parts[-1]] = before + value if both else value
     return parts[0]
 
 
@@ -105,9 +109,13 @@ def require(tree: dict[str, Any], key: str, path: Path) -> None:
     """Raises a ScenarioError unless the dotted key stands in the tree."""
     node: Any = tree
     for part in key.split("."):
-        if not isinstance(node, dict) or part not in node:
+        named = {tool["name"]: tool for tool in tree.get(NAMED, ())}
+        if part not in node and node is tree and part in named:
+            node = named[part]
+        elif isinstance(node, dict) and part in node:
+            node = node[part]
+        else:
             raise ScenarioError(f"{path}: missing key {key!r}")
-        node = node[part]
 
 
 def fit(schema: Any, value: Any, path: str = "") -> Any:
@@ -131,10 +139,10 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
     def refuse(expected: str) -> typing.NoReturn:
         raise ScenarioError(f"{path}={value!r}: expected {expected}")
 
+    schema = getattr(schema, "__value__", schema)
     origin = typing.get_origin(schema)
     if isinstance(schema, types.UnionType) or origin is typing.Union:
-        members = [m for m in typing.get_args(schema) if m is not type(None)]
-        return None if value is None else fit(members[0], value, path)
+        return None if value is None else fit(member(schema, value), value, path)
     if dataclasses.is_dataclass(schema):
         if not isinstance(value, dict):
             refuse("keys and values")
@@ -152,7 +160,7 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
         if not isinstance(value, list):
             refuse("a list, e.g. [0.0, 0.0, 0.1]")
         kind = typing.get_args(schema)[0]
-        return [fit(kind, item, f"{path}[{i}]") for i, item in enumerate(value)]
+        return [fit(kind, item, place(path, i, item)) for i, item in enumerate(value)]
     if origin is dict:
         if not isinstance(value, dict):
             refuse("keys and values")
@@ -166,6 +174,70 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
         names = {int: "a whole number", bool: "true or false", str: "a text"}
         refuse(names[schema])
     return value
+
+
+def place(path: str, index: int, item: Any) -> str:
+    """The key of a list's item; a tool is called by its name alone."""
+    named = path == NAMED and isinstance(item, dict) and item.get("name")
+    return str(named) if named else f"{path}[{index}]"
+
+
+def member(schema: Any, value: Any) -> Any:
+    """The one of several types that a value is of: by its `role`, or the first.
+
+    Raises:
+        ScenarioError: If none has the role.
+    """
+    members = [m for m in typing.get_args(schema) if m is not type(None)]
+    if len(members) == 1 or not isinstance(value, dict):
+        return members[0]
+    roles = {role: m for m in members for role in _roles(m)}
+    role = value.get("role", next(iter(_roles(members[0])), ""))
+    if role not in roles:
+        raise ScenarioError(f"role={role!r}: {nearest(str(role), roles)}")
+    return roles[role]
+
+
+def _roles(schema: Any) -> tuple[str, ...]:
+    told = {f.name: f.metadata for f in dataclasses.fields(schema)}
+    choices: tuple[str, ...] = told["role"]["parameter"].choices
+    return choices
+
+
+def make(schema: Any, value: Any) -> Any:
+    """The dataclass of plain data that fit it."""
+    schema = getattr(schema, "__value__", schema)
+    origin = typing.get_origin(schema)
+    if isinstance(schema, types.UnionType) or origin is typing.Union:
+        return None if value is None else make(member(schema, value), value)
+    if dataclasses.is_dataclass(schema):
+        kinds = typing.get_type_hints(schema)
+        made = {key: make(kinds[key], item) for key, item in value.items()}
+        return typing.cast(typing.Callable[..., Any], schema)(**made)
+    if origin is list:
+        return [make(typing.get_args(schema)[0], item) for item in value]
+    if origin is dict:
+        kind = typing.get_args(schema)[1]
+        return {key: make(kind, item) for key, item in value.items()}
+    return float(value) if schema is float else value
+
+
+def settle(schema: Any, value: Any, folder: Path) -> None:
+    """Makes the names of files in plain data absolute, taken from a folder."""
+    schema = getattr(schema, "__value__", schema)
+    if isinstance(schema, types.UnionType) and value is not None:
+        schema = member(schema, value)
+    if isinstance(value, list) and typing.get_origin(schema) is list:
+        for item in value:
+            settle(typing.get_args(schema)[0], item, folder)
+    if not isinstance(value, dict) or not dataclasses.is_dataclass(schema):
+        return
+    kinds = typing.get_type_hints(schema)
+    for field in dataclasses.fields(schema):
+        item, told = value.get(field.name), field.metadata.get("parameter")
+        if told and told.file and isinstance(item, str) and item:
+            value[field.name] = str(folder / item)
+        settle(kinds[field.name], item, folder)
 
 
 def _number(value: Any, refuse: typing.Callable[[str], typing.NoReturn]) -> float | int:

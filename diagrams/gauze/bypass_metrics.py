@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.gauze.scenario import WITHOUT_OBSTACLE
+from diagrams.gauze.tools import gap
 
 HAND_OVER = 0.02
 """The robot hands over while its tip is this near to S's tip; S may be touched [m]."""
@@ -25,7 +26,7 @@ def bypass_figures(
     near = status.near > 0.5
     held = status.condition[near] > 0.5
     approach = tip_error > HAND_OVER
-    to_target = run.clearance.target[approach]
+    to_target = gap(run, "target")[approach]
     figures = {
         "evasion_condition_held": float(held.mean()) if near.any() else 1.0,
         "dodging_time": float(np.mean(status.dodge) * time[-1]),

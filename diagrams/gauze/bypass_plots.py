@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.gauze.tools import CAMERA, OBSTACLE, TARGET, gap, logged
 
 MM = 1e3
 
@@ -16,12 +17,11 @@ def clearance(run: Any) -> Figure:
     time = run.signals["time"]
     upper = add_axes(figure, 2, 1, 1)
     for who, name in (
-        ("obstacle", "O"),
-        ("target", "S (touched at the hand-over)"),
-        ("camera", "endoscope"),
+        (OBSTACLE, "O"),
+        (TARGET, "S (touched at the hand-over)"),
+        (CAMERA, "endoscope"),
     ):
-        gap = getattr(run.clearance, who) * MM
-        upper.plot(time, gap, color=COLORS[who], label=name)
+        upper.plot(time, gap(run, who) * MM, color=COLORS[who], label=name)
     upper.axhline(0.0, color="k", lw=0.8)
     upper.set(ylabel="clearance [mm]", ylim=(-6.0, 40.0), xlim=(time[0], time[-1]))
     upper.legend(ncols=3, loc="upper right")
@@ -57,18 +57,21 @@ def forms(runs: dict[str, Any]) -> Figure:
     colors = [COLORS["robot"], COLORS["accent"], COLORS["muted"], COLORS["camera"]]
     first = next(iter(runs.values()))
     ends = []
-    for who, label in (("obstacle", "O"), ("target", "S")):
-        fulcrum = np.array(getattr(first.scenario, who).p_WG) * MM
-        tip = getattr(first, who).shaft.tip[-1] * MM
-        axes.plot(*np.column_stack([fulcrum, tip]), color=COLORS[who], lw=4)
-        axes.text(*tip, f"  {label}", color=COLORS[who])
+    scene = first.scenario
+    for tool in [*scene.obstacles, scene.target]:
+        fulcrum = np.array(tool.p_WG) * MM
+        tip = logged(first, tool).shaft.tip[-1] * MM
+        axes.plot(*np.column_stack([fulcrum, tip]), color=COLORS[tool.role], lw=4)
+        axes.text(
+            *tip, "  S" if tool.role == TARGET else "  O", color=COLORS[tool.role]
+        )
         ends += [fulcrum, tip]
     for (name, run), color in zip(runs.items(), colors, strict=False):
         tip, p_WG = run.robot.tool.tip * MM, run.robot.tool.fulcrum * MM
         axes.plot(*tip.T, color=color, lw=2.2, label=name)
         axes.plot(*tip[-1:].T, "o", color=color, ms=6)
         axes.plot(*np.stack([p_WG[-1], tip[-1]]).T, color=color, lw=1, ls=":")
-        left = np.linalg.norm(tip - run.target.shaft.tip * MM, axis=1)
+        left = np.linalg.norm(tip - logged(run, scene.target).shaft.tip * MM, axis=1)
         beside.plot(run.signals["time"], left, color=color, label=name)
         ends += [p_WG[0], *tip[::10]]
     points = np.array(ends)

@@ -197,7 +197,7 @@ class Constrained:
     def __post_init__(self) -> None:
         """Starts with nothing to dodge."""
         self._record = clearance_constraint.constants(self.params)[0]
-        self._dodging = np.zeros(clearance_constraint.TOOLS)
+        self._dodging = np.zeros(0)
 
     def step(
         self,
@@ -210,6 +210,9 @@ class Constrained:
         """The velocity of the robot's tip, see `Planner`."""
         start = time.perf_counter()
         wanted = self.inner.step(dt, robot, obstacle, target, others)
+        tools = around(obstacle, others)
+        if not len(self._dodging):
+            self._dodging = np.zeros(len(tools))
         v: Vector
         v, self._dodging, status = clearance_constraint.constrain(
             self._record,
@@ -218,7 +221,7 @@ class Constrained:
             robot.fulcrum,
             robot.tip,
             wanted,
-            around(obstacle, others),
+            tools,
             self._dodging,
         )
         self.seconds.append(time.perf_counter() - start)

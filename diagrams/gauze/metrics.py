@@ -6,6 +6,7 @@ import numpy as np
 
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
+from diagrams.gauze.tools import gap, logged
 from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
@@ -55,24 +56,25 @@ def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     time = run.signals["time"]
     tip = run.robot.tool.tip
-    tip_error = np.linalg.norm(tip - run.target.shaft.tip, axis=1)
-    clearance = run.clearance
+    tip_error = np.linalg.norm(tip - logged(run, run.scenario.target).shaft.tip, axis=1)
     force = np.linalg.norm(run.wall.force.f, axis=1)
     arrival = time_to_target(time, tip_error)
-    touched = bool(clearance.obstacle.min() <= 0.0)
+    touched = bool(gap(run, "obstacle").min() <= 0.0)
     speed = np.linalg.norm(np.gradient(tip, time, axis=0), axis=1)
     figures = {
         "reached": arrival is not None and not touched,
         "contact": touched,
         "time_to_target": arrival,
         "final_tip_error": float(tip_error[-1]),
-        "min_tool_clearance": float(clearance.obstacle.min()),
-        "min_target_clearance": float(clearance.target.min()),
-        "min_camera_clearance": float(clearance.camera.min()),
+        "min_tool_clearance": float(gap(run, "obstacle").min()),
+        "min_target_clearance": float(gap(run, "target").min()),
+        "min_camera_clearance": float(gap(run, "camera").min()),
         "max_lateral_force": float(force.max()),
         "rms_lateral_force": float(np.sqrt(np.mean(force**2))),
         "max_fulcrum_error": float(run.wall.fulcrum_error.distance.max()),
-        "time_in_view": float(in_cone(tip, run.camera.view_cone).mean()),
+        "time_in_view": float(
+            in_cone(tip, logged(run, run.scenario.camera).view_cone).mean()
+        ),
         "max_speed": float(speed.max()),
         "joint_limit_time": float(np.mean(run.joints.status.code) * time[-1]),
         "stops": stops(time, run.navigation.stop.code),

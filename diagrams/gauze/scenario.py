@@ -1,17 +1,26 @@
 """The scenario of a gauze delivery: every block's and part's parameters."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import math
+from typing import Any
 
 from diagrams.bedside.bedside import ToolAtStart
 from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.gauze.tools import (
+    CAMERA,
+    OBSTACLE,
+    TARGET,
+    CameraTool,
+    HandTool,
+    Tool,
+    usual_tools,
+)
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
-from plants.surgeon.surgeon_tool import SurgeonToolParams
 from systems.auto_guidance.backward_movement import BackwardMovementParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams
@@ -24,7 +33,6 @@ from systems.common.geometry import sub, unit
 from systems.common.parameter import parameter, part
 from systems.common.signal import vector
 from systems.common.signals import ViewCone
-from systems.motion.endoscope import EndoscopeParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.motion.tool_navigation import (
     ToolNavigationParams,
@@ -43,11 +51,6 @@ BEHAVIOURS = ("bypass", "field")
 class GauzeScenario(Scenario, WristSettings):
     """Auto-guided movements (section 5 of the paper): gauze to the surgeon."""
 
-    recording: str = parameter(
-        "",
-        "CSV t, x, y, z of O's tip in W, s and m, in place of its waypoints",
-        file=True,
-    )
     known_fulcrums: bool = parameter(
         False, "whether the estimators are told G_S and G_O, for comparison"
     )
@@ -56,13 +59,10 @@ class GauzeScenario(Scenario, WristSettings):
         0.0, "force figures of the wrist start here", "s", least=0.0, most=1e5
     )
     robot: ToolAtStart = part(ToolAtStart)
-    target: SurgeonToolParams = part(SurgeonToolParams)
-    obstacle: SurgeonToolParams = part(SurgeonToolParams)
+    tools: list[Tool] = field(default_factory=usual_tools)
     time_ratio: bool = parameter(
         False, "whether it is run without O as well, for the figure `time_ratio`"
     )
-    hunt: Hunt = part(Hunt)
-    camera: EndoscopeParams = part(EndoscopeParams)
     tracker: OpticalTrackerParams = part(OpticalTrackerParams)
     estimator: TrajectoryEstimatorParams = part(TrajectoryEstimatorParams)
     margins: Margins = part(Margins)
@@ -78,6 +78,27 @@ class GauzeScenario(Scenario, WristSettings):
     arm: ArmParams = part(ArmParams)
     instrument: InstrumentParams = part(InstrumentParams)
     abdomen: AbdomenParams = part(AbdomenParams)
+
+    def of_role(self, role: str) -> list[Any]:
+        """The tools of a role."""
+        return [tool for tool in self.tools if tool.role == role]
+
+    @property
+    def target(self) -> HandTool:
+        """S."""
+        tool: HandTool = self.of_role(TARGET)[0]
+        return tool
+
+    @property
+    def obstacles(self) -> list[HandTool]:
+        """O, and others like it."""
+        return self.of_role(OBSTACLE)
+
+    @property
+    def camera(self) -> CameraTool:
+        """The endoscope."""
+        tool: CameraTool = self.of_role(CAMERA)[0]
+        return tool
 
     @property
     def emulated(self) -> bool:
@@ -96,43 +117,57 @@ WITHDRAWN = 0.01
 
 
 def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
-    """The same scenario with O withdrawn to its trocar, if `time_ratio` asks for it."""
+    """The scenario with O withdrawn to its trocar, if `time_ratio` asks for it."""
     if not scenario.time_ratio:
         return {}
-    x, y, z = scenario.obstacle.p_WG
-    withdrawn = replace(
-        scenario.obstacle,
-        times=[0.0],
-        points=[[x, y, z - WITHDRAWN]],
-        recording=None,
-        pushes=[],
+    tools = [
+        withdrawn(t) if isinstance(t, HandTool) and t.role == OBSTACLE else t
+        for t in scenario.tools
+    ]
+    return {WITHOUT_OBSTACLE: replace(scenario, tools=tools, time_ratio=False)}
+
+
+def withdrawn(tool: HandTool) -> HandTool:
+    """A tool that stays just inside its trocar."""
+    x, y, z = tool.p_WG
+    inside = [[x, y, z - WITHDRAWN]]
+    return replace(
+        tool, times=[0.0], points=inside, recording=None, pushes=[], hunt=Hunt()
     )
-    alone = replace(
-        scenario, obstacle=withdrawn, recording="", hunt=Hunt(), time_ratio=False
-    )
-    return {WITHOUT_OBSTACLE: alone}
 
 
 def check(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    if scenario.hunt.speed and scenario.recording:
-        raise ScenarioError(
-            f"hunt.speed={scenario.hunt.speed}: expected 0 together with a recording"
-        )
+    _check_tools(scenario)
     check_wrist(scenario)
-    if scenario.recording:
-        load_recording(scenario.recording)
     _check_fulcrums(scenario)
     _check_reach(scenario)
 
 
+def _check_tools(scenario: GauzeScenario) -> None:
+    names = [tool.name for tool in scenario.tools]
+    for name in names:
+        if names.count(name) > 1 or not name.isidentifier():
+            raise ScenarioError(
+                f"tools={names}: expected names that differ, of letters, digits and _"
+            )
+    for role in (TARGET, CAMERA):
+        if len(scenario.of_role(role)) != 1:
+            called = [tool.name for tool in scenario.of_role(role)]
+            raise ScenarioError(f"tools of role {role!r}={called}: expected one")
+    for tool in scenario.of_role(TARGET) + scenario.obstacles:
+        if tool.hunt.speed and tool.recording:
+            raise ScenarioError(
+                f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with a "
+                "recording"
+            )
+        if tool.recording:
+            load_recording(tool.recording)
+
+
 def _check_fulcrums(scenario: GauzeScenario) -> None:
-    fulcrums = {
-        "robot": scenario.robot.p_WG,
-        "target": scenario.target.p_WG,
-        "obstacle": scenario.obstacle.p_WG,
-        "camera": scenario.camera.p_WG,
-    }
+    fulcrums = {"robot": scenario.robot.p_WG}
+    fulcrums |= {tool.name: tool.p_WG for tool in scenario.tools}
     names = list(fulcrums)
     for index, one in enumerate(names):
         for other in names[index + 1 :]:

@@ -13,12 +13,14 @@ from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.plots import plots
 from diagrams.gauze.scenario import GauzeScenario, check, companions
+from diagrams.gauze.tools import OBSTACLE, gather, hands, in_the_way, logged
 from plants.abdomen.wall_force import FulcrumError
 from plants.arm.signals import Posture
-from plants.instruments.clearance import Clearances
+from plants.instruments.clearance import Gap, column
 from systems.auto_guidance.fuzzy_arbiter import Weights
 from systems.bypass.clearance_constraint import ClearanceStatus
 from systems.bypass.tool_bypass import Way
+from systems.common.signal import Many
 from systems.common.signals import (
     Estimate,
     Force,
@@ -33,13 +35,6 @@ from systems.motion.joint_commands import Status
 from systems.motion.tool_navigation import StopCode
 
 SIGNALS = {
-    "robot.tool": RobotTool,
-    "target.shaft": Shaft,
-    "obstacle.shaft": Shaft,
-    "obstacle.tip_velocity": Velocity,
-    "target.estimate": Estimate,
-    "obstacle.estimate": Estimate,
-    "camera.view_cone": ViewCone,
     "planner.guide": Guide,
     "planner.v1": Velocity,
     "planner.v2": Velocity,
@@ -53,7 +48,7 @@ SIGNALS = {
     "navigation.stop": StopCode,
     "joints.posture": Posture,
     "joints.status": Status,
-    "clearance": Clearances,
+    "clearance": Gap,
     "wall.force": Force,
     "wall.fulcrum_error": FulcrumError,
 }
@@ -61,10 +56,23 @@ SIGNALS = {
 
 def signals(scenario: GauzeScenario) -> dict[str, Any]:
     """What is logged: without the bypass there is no way, without force no wrist."""
-    logged = SIGNALS | (WRIST_SIGNALS if scenario.emulated else {})
+    ports: dict[str, Any] = {"robot.tool": RobotTool}
+    tools = hands(scenario.tools, scenario.seed)
+    ports |= {f"{name}.shaft": Shaft for name in tools}
+    obstacles = [name for name, tool in tools.items() if tool.role == OBSTACLE]
+    ports |= {f"{name}.tip_velocity": Velocity for name in obstacles}
+    ports |= {f"{name}.estimate": Estimate for name in tools}
+    ports |= {f"{scenario.camera.name}.view_cone": ViewCone}
+    near = in_the_way(scenario.tools)
+    columns = tuple(column(name, role, near) for name, role in near)
+    ports |= {
+        port: Many(Gap, columns) if port == "clearance" else kind
+        for port, kind in SIGNALS.items()
+    }
+    ports |= WRIST_SIGNALS if scenario.emulated else {}
     if scenario.behaviour != "bypass":
-        del logged["planner.way"]
-    return logged
+        del ports["planner.way"]
+    return ports
 
 
 METRES_PER_NEWTON = 0.02
@@ -74,11 +82,11 @@ METRES_PER_NEWTON = 0.02
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """Trails of both tips, and the wall's force as an arrow at the fulcrum."""
     time = run.signals["time"]
-    for name, signal, rgba in (
-        ("robot", run.robot.tool.tip, (0.12, 0.37, 0.85, 1.0)),
-        ("obstacle", run.obstacle.shaft.tip, (0.85, 0.2, 0.15, 1.0)),
-    ):
-        draw_trail(meshcat, animation, f"trails/{name}", time, signal, rgba)
+    trails = {"robot": (run.robot.tool.tip, (0.12, 0.37, 0.85, 1.0))}
+    for tool in run.scenario.obstacles:
+        trails[tool.name] = (logged(run, tool).shaft.tip, (0.85, 0.2, 0.15, 1.0))
+    for name, (way, rgba) in trails.items():
+        draw_trail(meshcat, animation, f"trails/{name}", time, way, rgba)
     if run.scenario.emulated:
         decorate_wrist(meshcat, animation, run)
         return
@@ -93,6 +101,7 @@ STUDY = Study(
     name="gauze",
     scenario=GauzeScenario,
     make_diagram=lambda case: make_gauze_diagram(case.scenario),
+    gather=gather,
     check=check,
     measure=measure,
     signals=signals,

@@ -12,7 +12,7 @@ from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import refusals
 from diagrams.resection.operation import finish_plan, new_session, reach_of
 from diagrams.resection.scenario import ResectionScenario
-from plants.tissue.volume import TUMOUR
+from plants.tissue.labels import TUMOUR
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import (
@@ -20,6 +20,7 @@ from systems.resection.planning.procedure import (
     ENTRY,
     VOLUME,
     Procedure,
+    check_procedure,
     load_procedures,
     save_procedures,
 )
@@ -83,7 +84,7 @@ class Console:
         command = words[0]
         if command in (ENTRY, ELEMENTARY, VOLUME):
             proposal = procedure_from(words)
-            proposal.check(self.session.params)
+            check_procedure(proposal, self.session.params)
             self.proposal = proposal
             return self._check()
         if command == "suggest":

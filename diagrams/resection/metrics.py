@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
+from plants.tissue.labels import BRAIN, CAP, CRITICAL
 from plants.tissue.space import SOLID
-from plants.tissue.volume import BRAIN, CRITICAL
 
 
 def carving_of(run: Any) -> Any:
@@ -34,7 +34,7 @@ def measure(run: Any) -> dict[str, Any]:
     error = np.linalg.norm(tool[:, :3] - reference[:, :3], axis=1)
     volume = session.volume.tumour_volume
     steps = session.steps
-    cap = int(np.count_nonzero(session.volume.labels == 3)) * session.volume.voxel
+    cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
     return {
         "tumour_volume": volume,
         "mask_volume": session.volume.mask_volume,

@@ -9,9 +9,9 @@ import numpy as np
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.resection.metrics import carving_of
 from diagrams.resection.replay import coarse, shown_spacing
+from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
-from plants.tissue.volume import CAP, CRITICAL, TUMOUR
 
 MM = 1e3
 STEP_COLORS = ("#222222", "#c8402f", "#e5b80b", "#1f5fa8", "#2a8f4f", "#8e5bb0")
@@ -94,9 +94,9 @@ def _section(volume: Any, tau: np.ndarray, axis: int) -> np.ndarray:
     code = np.zeros(labels.shape, int)
     code[labels == TUMOUR] = 1
     code[(labels == TUMOUR) & gone] = 2
-    code[(labels == 2) | (labels == CAP)] = 3
+    code[(labels == CHANNEL) | (labels == CAP)] = 3
     code[labels == CRITICAL] = 4
-    code[(labels == 0) & gone] = 5
+    code[(labels == BRAIN) & gone] = 5
     return code
 
 

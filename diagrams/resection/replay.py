@@ -7,9 +7,9 @@ from pydrake.geometry import Rgba
 
 from diagrams.resection.metrics import carving_of
 from plants.snake.last_module import meridian
+from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
-from plants.tissue.volume import CAP, CRITICAL, TUMOUR
 from systems.resection.planning.procedure import widest_bend
 
 TISSUE = Rgba(0.93, 0.72, 0.42, 0.5)

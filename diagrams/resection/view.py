@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 
 from diagrams.resection.replay import TISSUE, coarse, shown_spacing
 from diagrams.snake.sliders import show_snake
+from plants.tissue.labels import CAP, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
-from plants.tissue.volume import CAP, TUMOUR
 from systems.resection.planning.feasibility_map import FeasibilityMap
 from systems.resection.planning.session import Session
 from systems.resection.wires.resection_ik import from_universal

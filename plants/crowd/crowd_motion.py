@@ -10,11 +10,13 @@ from math import cos, hypot, pi, sin
 import random
 from typing import Any
 
+import numpy as np
+
 from plants.crowd.orca import orca_towards
 from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle, filled
 from systems.common.block import Block
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import rows
+from systems.common.signal import size
 
 PERIOD = 0.25
 """Of everyone's decisions [s]."""
@@ -88,7 +90,7 @@ class CrowdMotion(Block):
         x, y = 2.0 * self.params.x, 2.0 * self.params.y
         self.goals = [(x - o.x, y - o.y) for o in people]
         self._decided = self.DeclareDiscreteState([0.0])
-        self._people = self.DeclareDiscreteState(filled(people))
+        self._people = self.DeclareDiscreteState(np.ravel(people))
         self.signal_out(
             "obstacles",
             OBSTACLES,
@@ -101,10 +103,10 @@ class CrowdMotion(Block):
         """Everyone at the context's time, straight on since the last decision."""
         state = context.get_discrete_state
         dt = context.get_time() - state(self._decided).value().item()
-        people = rows(OBSTACLES, state(self._people).value())[: len(self.goals)]
+        table = state(self._people).value().reshape(-1, size(Obstacle))
         return [
             Obstacle(x + dt * v_x, y + dt * v_y, radius, v_x, v_y)
-            for x, y, radius, v_x, v_y in people
+            for x, y, radius, v_x, v_y in table.tolist()
         ]
 
     def _update(self, context: Any) -> Sequence[Any]:
@@ -114,4 +116,4 @@ class CrowdMotion(Block):
             person._replace(v_x=v_x, v_y=v_y)
             for person, (v_x, v_y) in zip(people, moves, strict=True)
         ]
-        return [context.get_time()], filled(turned)
+        return np.array([context.get_time()]), np.ravel(turned)

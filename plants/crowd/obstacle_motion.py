@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle, filled
 from systems.common.block import Block
 from systems.common.parameter import Rules, check, parameter
@@ -136,6 +138,6 @@ class ObstacleMotion(Block):
             "obstacles", OBSTACLES, self._calc_obstacles, {self.time_ticket()}
         )
 
-    def _calc_obstacles(self, context: Any) -> Sequence[float]:
+    def _calc_obstacles(self, context: Any) -> np.ndarray:
         t = context.get_time()
         return filled([obstacle_at(params, t) for params in self.obstacles])

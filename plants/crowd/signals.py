@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from systems.common.signal import Field, Many, size
 
 CAPACITY = 24
@@ -25,7 +27,9 @@ class Obstacle(NamedTuple):
 OBSTACLES = Many(Obstacle, ROWS)
 
 
-def filled(obstacles: Sequence[Obstacle]) -> list[float]:
+def filled(obstacles: Sequence[Obstacle]) -> np.ndarray:
     """Obstacles as a port of `OBSTACLES` has them: nothing follows them."""
-    numbers = [number for obstacle in obstacles for number in obstacle]
-    return numbers + [0.0] * (size(OBSTACLES) - len(numbers))
+    table = np.zeros((CAPACITY, size(Obstacle)))
+    if obstacles:
+        table[: len(obstacles)] = obstacles
+    return table.ravel()

@@ -192,7 +192,7 @@ def length_range(params: SnakeParams) -> tuple[Array, Array]:
     half = params.max_bend / 2
     d, R = params.face, params.ball_radius
     c, s = 2 * d * math.cos(half), 2 * R * math.sin(half)
-    through = np.repeat(np.arange(1, MODULES + 1), WIRES)
+    through: Array = np.repeat(np.arange(1, MODULES + 1), WIRES)
     shortest, longest = (length_of_norm(p, *_geometry(params)) for p in (c - s, c + s))
     return through * shortest, through * longest
 

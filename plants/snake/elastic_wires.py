@@ -1,7 +1,7 @@
 """Elastic wires: springs along the wires that can go slack, and snap."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,44 +12,23 @@ from plants.snake.elastic import elastic_pull
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake import FAR, NEAR_ANGLES, POSITIONS
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 from systems.resection.wires.wire_drums import AXES
 
 
 @dataclass
 class WireBreak:
-    """A wire that snaps.
+    """A wire that snaps."""
 
-    Attributes:
-        wire: 0 to 8.
-        time: In s.
-    """
-
-    wire: int = 0
-    time: float = 0.0
+    wire: int = parameter(0, "which", least=0, most=8)
+    time: float = parameter(0.0, "when", "s", least=0.0, most=1e5)
 
 
 @dataclass
 class ElasticWiresParams:
-    """Parameters of `ElasticWires`.
+    """Parameters of `ElasticWires`."""
 
-    Attributes:
-        breaks: Wires that snap.
-    """
-
-    breaks: list[WireBreak] = field(default_factory=list)
-
-    def check(self) -> None:
-        """Raises ValueError for a wire that is not there or a time before zero."""
-        for item in self.breaks:
-            if not 0 <= item.wire <= 8:
-                raise ValueError(
-                    f"elastic_wires.breaks: wire={item.wire}, expected 0 to 8; nearest "
-                    f"{min(max(item.wire, 0), 8)}"
-                )
-            if not item.time >= 0.0:
-                raise ValueError(
-                    f"elastic_wires.breaks: time={item.time} s, expected >= 0"
-                )
+    breaks: list[WireBreak] = parameter([], "wires that snap", shape=(-1,))
 
 
 class ElasticWires(Block):
@@ -91,10 +70,9 @@ class ElasticWires(Block):
     ) -> None:
         """Makes the block."""
         super().__init__()
-        self._params = params or ElasticWiresParams()
-        self._params.check()
-        self._snake = (snake or SnakeParams()).check()
-        self._drive = (drive or SnakeDriveParams()).check()
+        self._params = check(params or ElasticWiresParams())
+        self._snake = check(snake or SnakeParams())
+        self._drive = check(drive or SnakeDriveParams())
         straight = wire_lengths(np.zeros(7), self._snake)
         # Compiles now, so that no run pays for it.
         elastic_pull(

@@ -31,10 +31,13 @@ TOOL = 2  # the tool would leave what it may remove
 BEND = 3  # a bend beyond its limit
 TRAVEL = 4  # the translation beyond its travel
 
+PLATE, SHANK, BALL = 6, 7, 8
+"""Parts of the body beyond its links 0 to 5; see `check_body`."""
+
 CULPRIT = 9
 """Numbers that name what a pose met: part, point, radius, voxel, axis of a plate."""
 
-SHANK = 1.2e-3
+SHANK_RADIUS = 1.2e-3
 """Radius of the tool's shank in m."""
 
 EDGE_SHARE = 8
@@ -100,7 +103,7 @@ def body_of(
         params.max_bend,
         params.travel[0],
         params.travel[1],
-        SHANK + clearance,
+        SHANK_RADIUS + clearance,
         step,
     )
 
@@ -188,7 +191,7 @@ def check_plate(s: Any, b: Any, c: Any, more: float, why: Any) -> int:
     half = b.face / 2
     x, y, z = c[5, 0] + half * n0, c[5, 1] + half * n1, c[5, 2] + half * n2
     why[6], why[7], why[8] = n0, n1, n2
-    return _blame(why, 6, x, y, z, b.body, at)
+    return _blame(why, PLATE, x, y, z, b.body, at)
 
 
 @compiled
@@ -203,7 +206,7 @@ def check_shank(s: Any, b: Any, c: Any, why: Any) -> int:
         z = c[5, 2] + share * (c[7, 2] - c[5, 2])
         at = first_solid(s, x, y, z, b.shank)
         if at != FREE:
-            return _blame(why, 7, x, y, z, b.shank, at)
+            return _blame(why, SHANK, x, y, z, b.shank, at)
         along += b.shank
     return OK
 
@@ -212,8 +215,8 @@ def check_shank(s: Any, b: Any, c: Any, why: Any) -> int:
 def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
     """OK or BODY for a body with corners c (8, 3); the culprit goes to why (9,).
 
-    Parts 0 to 5 are the links behind each ball (0 what lies in the channel), 6 the
-    last plate, 7 the shank. Those before `first` are taken for free.
+    Parts 0 to 5 are the links behind each ball (0 what lies in the channel), then
+    PLATE and SHANK. Those before `first` are taken for free.
     """
     status = check_links(s, b, c, first, why)
     if status == OK:
@@ -316,7 +319,7 @@ def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
         if whole and status == OK:
             at = first_forbidden(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius)
             if at != FREE:
-                why[0], why[1], why[2], why[3] = 8, c0[7, 0], c0[7, 1], c0[7, 2]
+                why[0], why[1], why[2], why[3] = BALL, c0[7, 0], c0[7, 1], c0[7, 2]
                 why[4], why[5] = b.radius, at
                 status = TOOL
         if status != OK:

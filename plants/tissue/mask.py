@@ -11,11 +11,12 @@ import sys
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.tissue import mask_labels, mask_reader
+from plants.tissue import mask_reader
 from plants.tissue.image import MaskError
+from plants.tissue.labels import BRAIN, TUMOUR
 from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.mask_reader import Labelled
-from plants.tissue.tissue import BRAIN, CRITICAL, TUMOUR, Tissue, parts_by_size
+from plants.tissue.tissue import Tissue, parts_by_size
 from systems.common.parameter import check
 
 MOST_TIME = 120
@@ -90,7 +91,7 @@ def _read_apart(file: Path, wanted: MaskLabels) -> Labelled:
 def tissue_of(part: Labelled, component: int, name: str) -> Tissue:
     """The tissue of a mask, of whose tumours one is taken."""
     notes = list(part.notes)
-    tumour = part.labels == mask_labels.TUMOUR
+    tumour = part.labels == TUMOUR
     numbers, sizes = parts_by_size(tumour)
     voxel = abs(float(np.linalg.det(part.X_PV[:3, :3])))
     chosen = numbers == _chosen(sizes, component)
@@ -108,9 +109,7 @@ def tissue_of(part: Labelled, component: int, name: str) -> Tissue:
     where = np.argwhere(chosen) + part.corner
     if (where.min(axis=0) == 0).any() or (where.max(axis=0) + 1 == part.sizes).any():
         notes.append("the tumour touches the image's border and may be cut off there")
-    labels = np.full(tumour.shape, BRAIN, np.uint8)
-    labels[chosen] = TUMOUR
-    labels[part.labels == mask_labels.CRITICAL] = CRITICAL
+    labels = np.where(left, BRAIN, part.labels).astype(np.uint8)
     X_PV = part.X_PV.copy()
     X_PV[:3, 3] += X_PV[:3, :3] @ (np.array(part.corner) - 1)
     padded = np.pad(labels, 1, constant_values=BRAIN)

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plants.tissue.image import Image, MaskError
+from plants.tissue.labels import BRAIN, CRITICAL, TUMOUR
 from plants.tissue.nifti import AUTO, TRANSFORMS
 from systems.common.parameter import Rules, parameter
-
-BACKGROUND, TUMOUR, CRITICAL = 0, 1, 2
-"""What `labels_of` makes of a mask's labels."""
 
 HIGHEST = 2**16 - 1
 MOST_LABELS = 256
@@ -71,7 +69,7 @@ class MaskLabels:
 
 
 def labels_of(image: Image, wanted: MaskLabels) -> NDArray[np.uint8]:
-    """BACKGROUND, TUMOUR or CRITICAL of each voxel of an image, (nx, ny, nz).
+    """BRAIN, TUMOUR or CRITICAL of each voxel of an image, (nx, ny, nz).
 
     Raises:
         MaskError: If it is no label map, or has not the labels wanted.
@@ -86,7 +84,7 @@ def labels_of(image: Image, wanted: MaskLabels) -> NDArray[np.uint8]:
                 f"labels.threshold={wanted.threshold:g}: its values go from {low:g} to "
                 f"{high:g}; expected > {low:g} and <= {high:g}"
             )
-        return np.where(values >= wanted.threshold, TUMOUR, BACKGROUND).astype(np.uint8)
+        return np.where(values >= wanted.threshold, TUMOUR, BRAIN).astype(np.uint8)
     if low < 0.0 or high > HIGHEST:
         raise _no_label_map(values, f"values from {low:g} to {high:g}")
     counts = np.zeros(HIGHEST + 1, int)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-BRAIN, TUMOUR, CRITICAL = 0, 1, 2
-"""Labels of a `Tissue`."""
+from plants.tissue.labels import CRITICAL, TUMOUR
+from systems.common.parameter import check, parameter
 
 
 @dataclass
@@ -96,36 +96,34 @@ def parts_by_size(
 
 @dataclass
 class SyntheticTumour:
-    """A seeded, irregular, lobed tumour, with a vessel beside it if wanted.
+    """A seeded, irregular, lobed tumour, with a vessel beside it if wanted."""
 
-    Attributes:
-        length: Longest side of its bounding box in m, 0.03 to 0.08.
-        lobes: Number of lobes about its core.
-        roughness: Height of its bumps over its radius.
-        vessel: Radius in m of a critical vessel beside it; 0 for none.
-        vessel_gap: Between the vessel's wall and the tumour's surface, in m.
-        seed: Of its shape.
-    """
-
-    length: float = 0.030
-    lobes: int = 5
-    roughness: float = 0.04
-    vessel: float = 0.0
-    vessel_gap: float = 0.0005
-    seed: int = 1
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        if not 0.005 <= self.length <= 0.1:
-            raise ValueError(
-                f"tumour.length={self.length} m: expected 0.03 to 0.08 (paper, II.B); "
-                f"nearest {min(max(self.length, 0.03), 0.08):g}"
-            )
-        if not 0 <= self.lobes <= 20:
-            raise ValueError(f"tumour.lobes={self.lobes}: expected 0 to 20")
-        for name in ("roughness", "vessel", "vessel_gap"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ValueError(f"tumour.{name}={getattr(self, name)}: expected >= 0")
+    length: float = parameter(
+        0.030,
+        "longest side of its bounding box; 0.03 to 0.08 in the paper (II.B)",
+        "m",
+        least=0.005,
+        most=0.1,
+    )
+    lobes: int = parameter(5, "lobes about its core", least=0, most=20)
+    roughness: float = parameter(
+        0.04, "height of its bumps over its radius", least=0.0, most=0.3
+    )
+    vessel: float = parameter(
+        0.0,
+        "radius of a critical vessel beside it; 0 for none",
+        "m",
+        least=0.0,
+        most=0.01,
+    )
+    vessel_gap: float = parameter(
+        0.0005,
+        "between the vessel's wall and the tumour's surface",
+        "m",
+        least=0.0,
+        most=0.02,
+    )
+    seed: int = parameter(1, "of its shape", least=0, most=2**63 - 1)
 
 
 def _shape(params: SyntheticTumour, points: NDArray) -> NDArray:
@@ -159,7 +157,7 @@ def synthetic_tumour(params: SyntheticTumour, spacing: float = 1.0e-3) -> Tissue
     Returns:
         The tissue, the voxels' axes along those of P.
     """
-    params.check()
+    check(params, "tumour")
     axis = np.linspace(-1.5, 1.5, 61)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     inside = np.argwhere(_shape(params, grid) > 0.0)

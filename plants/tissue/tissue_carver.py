@@ -11,33 +11,27 @@ from numpy.typing import NDArray
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, corners
 from plants.tissue.execution import Execution
+from plants.tissue.labels import CHANNEL, TUMOUR
 from plants.tissue.space import SOLID, Space, stamp
-from plants.tissue.volume import CHANNEL, TUMOUR, Volume
+from plants.tissue.volume import Volume
 from systems.common.block import Block
 from systems.common.compiled import compiled
+from systems.common.parameter import check, parameter
 from systems.resection.wires.resection_ik import universal
 
 
 @dataclass
 class TissueCarverParams:
-    """Parameters of `TissueCarver`.
+    """Parameters of `TissueCarver`."""
 
-    Attributes:
-        period: In s.
-        pitch: Longest way of the tool between two of its stamps, in m.
-    """
-
-    period: float = 0.02
-    pitch: float = 0.25e-3
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(
-                    f"tissue_carver.{name}={value}: expected > 0; the default is "
-                    f"{getattr(TissueCarverParams(), name)}"
-                )
+    period: float = parameter(0.02, "of the carving", "s", least=1e-3, most=0.1)
+    pitch: float = parameter(
+        0.25e-3,
+        "longest way of the tool between two of its stamps",
+        "m",
+        least=1e-5,
+        most=1e-3,
+    )
 
 
 @compiled
@@ -86,7 +80,7 @@ def carve(
         first = s.used[0]
         stamp(s, c[7, 0], c[7, 1], c[7, 2], b.radius, time)
         for m in range(first, s.used[0]):
-            if labels[s.freed[m]] == 1:
+            if labels[s.freed[m]] == TUMOUR:
                 tumour += 1
             else:
                 healthy += 1
@@ -200,9 +194,8 @@ class TissueCarver(Block):
     ) -> None:
         """Makes the block for tissue, a small block of tumour if None."""
         super().__init__()
-        self._params = params or TissueCarverParams()
-        self._params.check()
-        snake = (snake or SnakeParams()).check()
+        self._params = check(params or TissueCarverParams())
+        snake = check(snake or SnakeParams())
         self.carving = carving or Carving(_example_volume(), snake)
         self._voxel = self.carving.volume.voxel
         self._posture = self.vector_in("posture", [0.0] * 7)

@@ -16,46 +16,43 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.tissue import tissue
 from plants.tissue.critical import Boxes, cover
+from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID, Space, journals
 from plants.tissue.tissue import Tissue, parts_by_size, signed_distance
-
-BRAIN, TUMOUR, CHANNEL, CAP, CRITICAL = 0, 1, 2, 3, 4
-NAMES = ("brain", "tumour", "channel", "cap", "critical")
-"""Labels of a `Volume`."""
+from systems.common.parameter import Rules, check, parameter
 
 Vector = NDArray[np.float64]
 
 
 @dataclass
 class Access:
-    """Where and how the access robot reaches the tumour.
+    """Where and how the access robot reaches the tumour."""
 
-    Attributes:
-        point: A point on the channel's axis in P, in m; the tumour's centroid if
-            None. A point outside is where the channel starts.
-        direction: Of the channel, into the tumour, in P; proposed if None.
-        clearance: Of the body in the channel, in m.
-    """
+    # A point outside is where the channel starts.
+    point: list[float] | None = parameter(
+        None,
+        "a point on the channel's axis in P; the tumour's centroid if left out",
+        "m",
+        least=-2.0,
+        most=2.0,
+        shape=(3,),
+    )
+    direction: list[float] | None = parameter(
+        None,
+        "of the channel, into the tumour, in P; proposed if left out",
+        least=-1e3,
+        most=1e3,
+        shape=(3,),
+    )
+    clearance: float = parameter(
+        1.0e-3, "of the body in the channel", "m", above=0.0, most=0.01
+    )
 
-    point: list[float] | None = None
-    direction: list[float] | None = None
-    clearance: float = 1.0e-3
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name in ("point", "direction"):
-            v = getattr(self, name)
-            if v is not None and (len(v) != 3 or not all(map(math.isfinite, v))):
-                raise ValueError(f"access.{name}={v}: expected three finite numbers")
-        if self.direction is not None and math.hypot(*self.direction) < 1e-9:
-            raise ValueError(f"access.direction={self.direction}: expected a direction")
-        if not 0.0 < self.clearance <= 0.01:
-            raise ValueError(
-                f"access.clearance={self.clearance} m: expected > 0 and at most 0.01; "
-                "the default is 0.001"
-            )
+    def rules(self) -> Rules:
+        """A direction has a length."""
+        n = self.direction
+        yield n is None or math.hypot(*n) >= 1e-9, "direction", "a direction"
 
 
 @dataclass
@@ -194,7 +191,7 @@ def channel_frame(body: Tissue, access: Access) -> Vector:
     Raises:
         ValueError: If the line misses the tumour; it says by how much.
     """
-    access.check()
+    check(access)
     if access.direction is None:
         raise ValueError("access.direction is not given; propose one first")
     z = np.array(access.direction, float)
@@ -232,7 +229,7 @@ def _is_tumour(body: Tissue, points: Vector, X_VP: Vector) -> NDArray[np.bool_]:
     index = np.rint(points @ X_VP[:3, :3].T + X_VP[:3, 3]).astype(int)
     inside = ((index >= 0) & (index < body.labels.shape)).all(axis=1)
     hit = np.zeros(len(points), bool)
-    hit[inside] = body.labels[tuple(index[inside].T)] == tissue.TUMOUR
+    hit[inside] = body.labels[tuple(index[inside].T)] == TUMOUR
     return hit
 
 
@@ -284,8 +281,8 @@ def make_volume(
         )
     notes: list[str] = []
     critical, to_critical = None, np.empty(0, np.float32)
-    if (body.labels == tissue.CRITICAL).any():
-        critical = Boxes(np.argwhere(body.labels == tissue.CRITICAL), X_WV)
+    if (body.labels == CRITICAL).any():
+        critical = Boxes(np.argwhere(body.labels == CRITICAL), X_WV)
         covered, to_critical = cover(critical, origin, spacing, labels.shape)
         both = np.count_nonzero(covered & (labels == TUMOUR)) * spacing**3
         if both > 0.0:
@@ -335,7 +332,7 @@ def _tumour_on_grid(
     volume of the mask itself. A synthetic tumour is its shape, of which the voxels are
     only samples: there it is the zero.
     """
-    tumour = np.argwhere(body.labels == tissue.TUMOUR)
+    tumour = np.argwhere(body.labels == TUMOUR)
     corner, end = tumour.min(axis=0) - 2, tumour.max(axis=0) + 3
     mask = np.zeros(end - corner, bool)
     mask[tuple((tumour - corner).T)] = True

@@ -19,7 +19,7 @@ from plants.common.looks import DARK, GREEN, RED, STEEL, illustration
 from plants.crowd.signals import OBSTACLES
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
-from systems.common.signal import rows
+from systems.common.signal import view
 
 FLOOR = [0.88, 0.89, 0.87, 1.0]
 BODY = [0.12, 0.37, 0.75, 1.0]
@@ -82,10 +82,10 @@ class Arena(Block):
             RotationMatrix.MakeZRotation(robot.theta), [robot.x, robot.y, 0.0]
         )
         poses.set_value(self._robot_frame, X_WR)
-        obstacles = rows(OBSTACLES, self._obstacles.Eval(context))
-        # Rows without an obstacle have no frame.
-        for frame, o in zip(self._frames, obstacles, strict=False):
-            poses.set_value(frame, RigidTransform([o.x, o.y, 0.0]))
+        obstacles = view(OBSTACLES, self._obstacles.Eval(context))
+        for k, frame in enumerate(self._frames):
+            p_WO = [obstacles.x[k], obstacles.y[k], 0.0]
+            poses.set_value(frame, RigidTransform(p_WO))
         output.set_value(poses)
 
     def _add_frame(self, name: str) -> Any:

@@ -10,16 +10,18 @@ constant 1/B and dies out when O stops, as the text says.
 O stops.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from systems.auto_guidance.nearest import obstacle_at
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, shaft_point_velocity, sub, unit
 from systems.common.parameter import check, parameter
-from systems.common.signal import Vector
+from systems.common.signal import Many, Vector
 from systems.common.signals import Estimate, Guide, Velocity, finite_guide, usable
 from systems.common.step_block import StepBlock
 
@@ -84,8 +86,9 @@ def constants(params: BackwardMovementParams) -> np.ndarray:
 
 @compiled
 def _step(
-    params: Any, state: State, time: float, guide: Guide, obstacle: Estimate
+    params: Any, state: State, time: float, guide: Guide, obstacles: np.ndarray
 ) -> tuple[State, Velocity]:
+    obstacle = obstacle_at(guide, obstacles)
     v3 = backward_movement(params, state.v3, time - state.time, guide, obstacle)
     return State(v3, time), Velocity(v3)
 
@@ -96,15 +99,20 @@ class BackwardMovement(StepBlock):
     Bauzano et al., section 4.3, equation (5); see the module.
 
     Port ``guide`` accepts the `Guide`.
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
     Port ``v3`` emits v_3, the retreat of the guide point, a `Velocity`.
     """
 
-    def __init__(self, params: BackwardMovementParams | None = None) -> None:
+    def __init__(
+        self,
+        params: BackwardMovementParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -114,7 +122,7 @@ class BackwardMovement(StepBlock):
         self.declare_step(
             _step,
             [constants(params)],
-            {"guide": Guide, "obstacle": Estimate},
+            {"guide": Guide, "obstacles": Many(Estimate, tuple(obstacles))},
             State((0.0, 0.0, 0.0), -params.period),
             {"v3": Velocity},
             params.period,

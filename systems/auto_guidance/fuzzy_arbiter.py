@@ -23,6 +23,7 @@ add the corrections, (1, 1, 0), and next to the obstacle the backward movement,
 An obstacle at rest has no direction, and is left to the field.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import sqrt
@@ -31,6 +32,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from systems.auto_guidance.backward_movement import contact_velocity
+from systems.auto_guidance.nearest import obstacle_at
 from systems.common.compiled import compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
@@ -48,7 +50,7 @@ from systems.common.geometry import (
     unit,
 )
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import Field, Vector, reader
+from systems.common.signal import Field, Many, Vector, reader
 from systems.common.signals import (
     Estimate,
     Guide,
@@ -317,7 +319,7 @@ def _step(
     v3: Velocity,
     guide: Guide,
     robot: RobotTool,
-    obstacle: Estimate,
+    obstacles: np.ndarray,
     target: Estimate,
 ) -> tuple[State, Weights, Velocity]:
     weights, v_tip, s = arbitrate(
@@ -327,7 +329,7 @@ def _step(
         (v1.v, v2.v, v3.v),
         guide,
         robot,
-        obstacle,
+        obstacle_at(guide, obstacles),
         target,
     )
     return State(v_tip, time), weights, Velocity(scaled(s, v_tip))
@@ -345,7 +347,7 @@ class FuzzyArbiter(StepBlock):
     Port ``v3`` accepts v_3 of the backward movement, a `Velocity`.
     Port ``guide`` accepts the `Guide`.
     Port ``robot_tool`` accepts the `RobotTool`.
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
     Port ``target`` accepts the `Estimate` of the target tool S.
     Port ``weights`` emits the `Weights`.
     Port ``v_R`` emits the commanded `Velocity` of the guide point.
@@ -353,11 +355,16 @@ class FuzzyArbiter(StepBlock):
     The outputs are those of the step from the last update to now: no sample of delay.
     """
 
-    def __init__(self, params: FuzzyArbiterParams | None = None) -> None:
+    def __init__(
+        self,
+        params: FuzzyArbiterParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -373,7 +380,7 @@ class FuzzyArbiter(StepBlock):
                 "v3": Velocity,
                 "guide": Guide,
                 "robot_tool": RobotTool,
-                "obstacle": Estimate,
+                "obstacles": Many(Estimate, tuple(obstacles)),
                 "target": Estimate,
             },
             State((0.0, 0.0, 0.0), -params.period),

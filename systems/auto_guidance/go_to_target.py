@@ -28,12 +28,14 @@ which attraction alone asks for v_max; attraction is cut at the same distance.
 the robot away from its goal rather than from the obstacle, and orbits.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from systems.auto_guidance.nearest import nearest_obstacle
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     across,
@@ -51,7 +53,7 @@ from systems.common.geometry import (
     unit,
 )
 from systems.common.parameter import check, parameter
-from systems.common.signal import Vector
+from systems.common.signal import Many, Vector
 from systems.common.signals import (
     Estimate,
     Guide,
@@ -310,10 +312,10 @@ def _step(
     state: State,
     time: float,
     robot: RobotTool,
-    obstacle: Estimate,
+    obstacles: np.ndarray,
     target: Estimate,
 ) -> tuple[State, Velocity, Guide]:
-    dt = time - state.time
+    dt, obstacle = time - state.time, nearest_obstacle(robot, obstacles)
     v_tip, guide = go_to_target(params, state.v_tip, dt, robot, obstacle, target)
     return State(v_tip, time), Velocity(scaled(guide.s, v_tip)), guide
 
@@ -324,7 +326,7 @@ class GoToTarget(StepBlock):
     Bauzano et al., section 4.1, equations (1) to (4); see the module.
 
     Port ``robot_tool`` accepts the `RobotTool`.
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
     Port ``target`` accepts the `Estimate` of the target tool S.
     Port ``v1`` emits the guide point's `Velocity` v_1.
     Port ``guide`` emits the `Guide`.
@@ -332,11 +334,16 @@ class GoToTarget(StepBlock):
     The outputs are those of the step from the last update to now: no sample of delay.
     """
 
-    def __init__(self, params: GoToTargetParams | None = None) -> None:
+    def __init__(
+        self,
+        params: GoToTargetParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -346,7 +353,11 @@ class GoToTarget(StepBlock):
         self.declare_step(
             _step,
             [constants(params)],
-            {"robot_tool": RobotTool, "obstacle": Estimate, "target": Estimate},
+            {
+                "robot_tool": RobotTool,
+                "obstacles": Many(Estimate, tuple(obstacles)),
+                "target": Estimate,
+            },
             State((0.0, 0.0, 0.0), -params.period),
             {"v1": Velocity, "guide": Guide},
             params.period,

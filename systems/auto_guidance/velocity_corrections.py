@@ -14,6 +14,7 @@ An obstacle that stands has no crossing time: v_2 = 0, it is the potential
 field's task (the paper's static case).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import exp, sqrt
@@ -21,6 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from systems.auto_guidance.nearest import obstacle_at
 from systems.common.compiled import compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
@@ -34,7 +36,7 @@ from systems.common.geometry import (
     unit,
 )
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import Vector
+from systems.common.signal import Many, Vector
 from systems.common.signals import Estimate, Guide, Velocity, finite_guide, usable
 from systems.common.step_block import StepBlock
 
@@ -252,8 +254,9 @@ def velocity_correction(
 
 @compiled
 def _correct(
-    params: Any, v1: Velocity, guide: Guide, obstacle: Estimate
+    params: Any, v1: Velocity, guide: Guide, obstacles: np.ndarray
 ) -> tuple[Velocity]:
+    obstacle = obstacle_at(guide, obstacles)
     return (Velocity(velocity_correction(params, v1.v, guide, obstacle)),)
 
 
@@ -265,15 +268,20 @@ class VelocityCorrections(StepBlock):
 
     Port ``v1`` accepts the guide point's `Velocity` v_1.
     Port ``guide`` accepts the `Guide`.
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
     Port ``v2`` emits the correction v_2, a `Velocity`.
     """
 
-    def __init__(self, params: VelocityCorrectionsParams | None = None) -> None:
+    def __init__(
+        self,
+        params: VelocityCorrectionsParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -282,7 +290,11 @@ class VelocityCorrections(StepBlock):
         self.declare_map(
             _correct,
             [constants(params or VelocityCorrectionsParams())],
-            {"v1": Velocity, "guide": Guide, "obstacle": Estimate},
+            {
+                "v1": Velocity,
+                "guide": Guide,
+                "obstacles": Many(Estimate, tuple(obstacles)),
+            },
             "v2",
             Velocity,
         )

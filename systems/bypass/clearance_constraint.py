@@ -25,6 +25,7 @@ Braking: the closing speed allowed falls as gamma (rho - D_safe), so the deceler
 asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_O).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
@@ -54,7 +55,7 @@ from systems.common.geometry import (
 from systems.common.parameter import Rules, check, parameter
 from systems.common.projection import greatest_rate, nearest_velocity
 from systems.common.reach_limits import ReachLimits
-from systems.common.signal import Field, Vector
+from systems.common.signal import Field, Many, Vector
 from systems.common.signals import (
     FREE,
     Estimate,
@@ -63,6 +64,7 @@ from systems.common.signals import (
     RobotTool,
     Velocity,
     ViewCone,
+    all_usable,
     finite_cone,
     finite_guide,
     finite_tool,
@@ -76,8 +78,6 @@ _OUTWARDS = 0.05
 """Share of insertion in A above which retracting would bring R nearer to the tool."""
 _MISSED = 1e-3
 """A row is missed by more than the solver's own error, m/s."""
-TOOLS = 3
-"""Most obstacle tools: O, S, endoscope."""
 
 
 class ClearanceStatus(NamedTuple):
@@ -108,13 +108,13 @@ class ClearanceConstraintParams:
         1.0, "omega_max of the shaft", "rad/s", above=0.0, most=10.0
     )
     rate: float = parameter(
-        4.0, "gamma; at most a_max / (v_max + V_O)", "1/s", above=0.0, most=60.0
+        4.0, "gamma; at most a_max / (v_max + V_O)", "1/s", least=0.1, most=60.0
     )
     obstacle_speed: float = parameter(
         0.06,
         "V_O to be reckoned with: within D_safe + V_O / gamma a tool counts as near",
         "m/s",
-        above=0.0,
+        least=0.01,
         most=0.5,
     )
     dodge: bool = parameter(True, "whether to dodge")
@@ -238,17 +238,18 @@ def constrain(
         g: Fulcrum G_R, m.
         p: Tip of R, m.
         wanted: The tip's wanted velocity, m/s.
-        tools: Rows of `ObstacleTool`, at most `TOOLS`.
-        dodging: Whether R dodges each of them (3), 1 or 0.
+        tools: Rows of `ObstacleTool`.
+        dodging: Whether R dodges each of them, 1 or 0; as many or more.
 
     Returns:
-        The tip's velocity in m/s, whether R dodges each tool (3), and the status.
+        The tip's velocity in m/s, whether R dodges each tool, and the status.
     """
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft)
     turning = q * params.turning_speed
-    rows, bounds = np.empty((3 * TOOLS + 5, 3)), np.empty(3 * TOOLS + 5)
-    dodges = np.zeros(TOOLS)
+    most = 3 * len(tools) + 5
+    rows, bounds = np.empty((most, 3)), np.empty(most)
+    dodges = np.zeros(len(dodging))
     least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
     near = params.obstacle_speed / params.rate
     inwards, room = borders(workspace, view_cone, g, p)
@@ -309,20 +310,20 @@ def _step(
     v_R: Velocity,
     guide: Guide,
     robot: RobotTool,
-    obstacle: Estimate,
+    obstacles: np.ndarray,
     target: Estimate,
     camera: Estimate,
     view_cone: ViewCone,
     permission: Permission,
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
     v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
-    known = usable(obstacle) and usable(target)
+    known = all_usable(obstacles) and usable(target)
     numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
     if not (known and numbers):
         nothing = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return np.zeros(TOOLS), Velocity(v), nothing
+        return np.zeros(len(dodging)), Velocity(v), nothing
     g, s = robot.fulcrum, guide.s
-    tools = obstacle_tools(margins, g, obstacle, target, camera)
+    tools = obstacle_tools(margins, g, obstacles, target, camera)
     share = max(0.0, min(1.0, permission.speed_scale)) / s
     v, dodges, status = constrain(
         params,
@@ -348,7 +349,7 @@ class ClearanceConstraint(StepBlock):
     Port ``v_R`` accepts the wanted `Velocity` of the guide point.
     Port ``guide`` accepts the `Guide`, of which s is used.
     Port ``robot_tool`` accepts the `RobotTool`.
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool.
     Port ``target`` accepts the `Estimate` of the target tool S.
     Port ``camera`` accepts the `Estimate` of the endoscope.
     Port ``view_cone`` accepts the `ViewCone`.
@@ -357,7 +358,7 @@ class ClearanceConstraint(StepBlock):
     Port ``v_safe`` emits the `Velocity` of the guide point.
     Port ``status`` emits the `ClearanceStatus`.
 
-    The discrete state is whether R dodges each tool (3).
+    The discrete state is whether R dodges each tool: the obstacles, S, the endoscope.
     """
 
     def __init__(
@@ -366,6 +367,7 @@ class ClearanceConstraint(StepBlock):
         margins: Margins | None = None,
         reach: ReachLimits | None = None,
         workspace: WorkspaceParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
     ) -> None:
         """Builds the block.
 
@@ -374,6 +376,7 @@ class ClearanceConstraint(StepBlock):
             margins: Distances to the tools; the defaults if None.
             reach: What the navigation behind it keeps to; the defaults if None.
             workspace: Further limits of R's tip; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -391,13 +394,13 @@ class ClearanceConstraint(StepBlock):
                 "v_R": Velocity,
                 "guide": Guide,
                 "robot_tool": RobotTool,
-                "obstacle": Estimate,
+                "obstacles": Many(Estimate, tuple(obstacles)),
                 "target": Estimate,
                 "camera": Estimate,
                 "view_cone": ViewCone,
                 "permission": Permission,
             },
-            np.zeros(TOOLS),
+            np.zeros(len(obstacles) + 2),
             {"v_safe": Velocity, "status": ClearanceStatus},
             params.period,
             timed=False,

@@ -1,4 +1,4 @@
-"""The tools that R must not touch: O, S's own shaft, the endoscope.
+"""The tools that R must not touch: the obstacles, S's own shaft, the endoscope.
 
 S is where R has to go, so its last part is left out: as much as the final pose itself
 comes nearer to than the distance that is planned with. What is left of S is an obstacle
@@ -15,8 +15,8 @@ from systems.bypass.shadow_body import ObstacleTool, write_tool
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, dot, norm, shaft_point_velocity, sub, unit
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import Vector, reader, size
-from systems.common.signals import Estimate, usable
+from systems.common.signal import Vector, size
+from systems.common.signals import Estimate, read_estimate, usable
 
 _LEAST_SINE = 0.15
 """Of the angle between S and R at the hand-over: no more of S is left out than this."""
@@ -25,7 +25,6 @@ _CLEAR = 0.001
 
 
 COLUMNS = size(ObstacleTool)
-read_estimate = reader(Estimate)
 
 
 @dataclass
@@ -159,20 +158,20 @@ def target_shaft(
 
 @compiled
 def obstacle_tools(
-    margins: Any, g: Vector, obstacle: Estimate, target: Estimate, camera: Estimate
+    margins: Any, g: Vector, obstacles: np.ndarray, target: Estimate, camera: Estimate
 ) -> np.ndarray:
-    """The obstacle tools (n, 11), O first; see `ObstacleTool`.
+    """The tools to keep clear of (m, 11), the obstacles first; see `ObstacleTool`.
 
     Args:
         margins: A record of `constants`.
         g: Fulcrum G_R, m.
-        obstacle: Of O, usable.
+        obstacles: Estimates (n, 17), usable.
         target: Of S, usable.
         camera: Of the endoscope.
     """
-    rows = np.empty((3, COLUMNS))
-    write_tool(rows, 0, tool_of(margins, obstacle, 0.0))
-    count = 1
+    count = len(obstacles)
+    rows = np.empty((count + 2, COLUMNS))
+    rows[:count] = tool_rows(margins, obstacles)
     if margins.avoid_target:
         is_left, shaft = target_shaft(margins, g, target)
         if is_left:

@@ -9,6 +9,7 @@ the goal. The tip's velocity is v = min(v_max, k Gamma) along the way, plus that
 moving target, and the guide point's v_1 = s v, as in the paper's form (`go_to_target`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
@@ -20,6 +21,7 @@ from systems.auto_guidance.go_to_target import (
     guide_point,
     known_places,
 )
+from systems.auto_guidance.nearest import nearest_obstacle
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
 from systems.bypass.bypass_route import choose_way
@@ -29,13 +31,14 @@ from systems.common.compiled import compiled, packed
 from systems.common.geometry import limited, plus, scaled, sub
 from systems.common.parameter import Rules, check, parameter
 from systems.common.reach_limits import ReachLimits
-from systems.common.signal import Field, Vector
+from systems.common.signal import Field, Many, Vector
 from systems.common.signals import (
     Estimate,
     Guide,
     RobotTool,
     Velocity,
     ViewCone,
+    all_usable,
     finite_cone,
     finite_tool,
     usable,
@@ -50,8 +53,8 @@ class Way(NamedTuple):
         float,
         Field(
             "1",
-            "0 straight, -1 up and over, 1 and 2 the top and the tip edge of O, then "
-            "of S and of the endoscope",
+            "0 straight, -1 up and over, 1 and 2 the top and the tip edge of the "
+            "first obstacle, 3 and 4 of the second, then of S and of the endoscope",
             0.0,
         ),
     ]
@@ -187,12 +190,13 @@ def _step(
     state: State,
     time: float,
     robot: RobotTool,
-    obstacle: Estimate,
+    obstacles: np.ndarray,
     target: Estimate,
     camera: Estimate,
     view_cone: ViewCone,
 ) -> tuple[State, Velocity, Guide, Way]:
     dt, g, p = time - state.time, robot.fulcrum, robot.tip
+    obstacle = nearest_obstacle(robot, obstacles)
     stop = limited(scaled(-1.0, state.v_tip), params.max_acceleration * dt)
     v_tip, aim = plus(state.v_tip, stop), p
     edge, waits, switches = int(state.way), int(state.waiting), state.switches
@@ -202,8 +206,8 @@ def _step(
         guide = at_the_tip(p)
     else:
         guide = guide_point(robot, obstacle, target.p, params.proportion_floor)
-        if usable(obstacle) and usable(target) and finite_cone(view_cone):
-            tools = obstacle_tools(margins, g, obstacle, target, camera)
+        if all_usable(obstacles) and usable(target) and finite_cone(view_cone):
+            tools = obstacle_tools(margins, g, obstacles, target, camera)
             before = edge
             v_tip, edge, waits, aim = bypass(
                 params,
@@ -232,7 +236,7 @@ class ToolBypass(StepBlock):
     A third form of the paper's "Go-to Target" (section 4.1); see the module.
 
     Port ``robot_tool`` accepts the `RobotTool`.
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool.
     Port ``target`` accepts the `Estimate` of the target tool S.
     Port ``camera`` accepts the `Estimate` of the endoscope.
     Port ``view_cone`` accepts the `ViewCone`.
@@ -249,6 +253,7 @@ class ToolBypass(StepBlock):
         margins: Margins | None = None,
         reach: ReachLimits | None = None,
         workspace: WorkspaceParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
     ) -> None:
         """Builds the block.
 
@@ -257,6 +262,7 @@ class ToolBypass(StepBlock):
             margins: Distances to the tools; the defaults if None.
             reach: What the navigation behind it keeps to; the defaults if None.
             workspace: Further limits of R's tip; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -272,7 +278,7 @@ class ToolBypass(StepBlock):
             ],
             {
                 "robot_tool": RobotTool,
-                "obstacle": Estimate,
+                "obstacles": Many(Estimate, tuple(obstacles)),
                 "target": Estimate,
                 "camera": Estimate,
                 "view_cone": ViewCone,

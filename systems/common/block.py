@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from pydrake.common import RandomDistribution
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
@@ -49,10 +50,18 @@ class Block(LeafSystem):
         super().__init__()
         self.signals: dict[str, Any] = {}
 
-    def signal_in(self, name: str, signal: Any) -> Any:
-        """Declares an input port of a signal and returns it."""
+    def signal_in(
+        self, name: str, signal: Any, drawn: RandomDistribution | None = None
+    ) -> Any:
+        """Declares an input port of a signal and returns it.
+
+        Args:
+            name: The port's name.
+            signal: What it accepts.
+            drawn: How its elements are drawn if it is noise.
+        """
         self.signals[name] = signal
-        return self.vector_in(name, flat(example(signal)).tolist())
+        return self.vector_in(name, flat(example(signal)).tolist(), drawn)
 
     def signal_out(
         self,
@@ -74,16 +83,21 @@ class Block(LeafSystem):
         self.signals[name] = signal
         return self.vector_out(name, size(signal), calc, prerequisites)
 
-    def vector_in(self, name: str, example: Sequence[float]) -> Any:
+    def vector_in(
+        self,
+        name: str,
+        example: Sequence[float],
+        drawn: RandomDistribution | None = None,
+    ) -> Any:
         """Declares a vector input port and returns it.
 
         Args:
             name: The port's name.
             example: A sensible value; its length is the port's size.
+            drawn: How its elements are drawn if it is noise.
         """
-        return VectorInput(
-            self.DeclareVectorInputPort(name, BasicVector(np.asarray(example, float)))
-        )
+        model = BasicVector(np.asarray(example, float))
+        return VectorInput(self.DeclareVectorInputPort(name, model, drawn))
 
     def vector_out(
         self,

@@ -117,12 +117,15 @@ def default_of(declared: Any) -> Any:
     return None if declared.default is MISSING else declared.default
 
 
-def check(params: Any, owner: str | None = None) -> None:
+def check[T: Any](params: T, owner: str | None = None) -> T:
     """Checks a dataclass of parameters and all that are in it.
 
     Args:
         params: The dataclass.
         owner: Its key in the scenario, "" for the scenario; by its name if None.
+
+    Returns:
+        The dataclass itself.
 
     Raises:
         ParameterError: With the whole key, the value, what was expected and the
@@ -144,12 +147,16 @@ def check(params: Any, owner: str | None = None) -> None:
             key = f"{owner}.{name}" if owner else name
             told = {f.name: f.metadata.get("parameter") for f in fields(params)}
             _refuse(key, getattr(params, name), told[name], expected, None)
+    return params
 
 
 def _dataclasses(key: str, value: Any) -> list[tuple[str, Any]]:
+    """What is in a field, by its key; a tool is called by its name alone."""
     items = [(key, value)]
     if isinstance(value, list):
         items = [(f"{key}[{index}]", item) for index, item in enumerate(value)]
+        if key == "tools":
+            items = [(item.name, item) for item in value]
     return [(part, item) for part, item in items if is_dataclass(item)]
 
 

@@ -10,7 +10,7 @@ from math import sqrt
 
 import numpy as np
 
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import (
     across,
     along,
@@ -33,7 +33,7 @@ _LITTLE = 1e-4
 
 
 @compiled
-def onto_limits(v: Vector, u: Numbers, speed: float, turning: float) -> Vector:
+def onto_limits(v: Vector, u: Vector, speed: float, turning: float) -> Vector:
     """The nearest velocity of at most `speed`, and of at most `turning` across u.
 
     Exact: in the half plane of u and v it is the nearest point of a disc cut by a line.
@@ -56,7 +56,7 @@ def onto_limits(v: Vector, u: Numbers, speed: float, turning: float) -> Vector:
 
 
 @compiled
-def most_missed(v: Numbers, rows: np.ndarray, bounds: np.ndarray) -> float:
+def most_missed(v: Vector, rows: np.ndarray, bounds: np.ndarray) -> float:
     """By how much v misses the row it misses most, m/s; 0 if none."""
     missed = 0.0
     for i in range(len(bounds)):
@@ -69,7 +69,7 @@ def nearest_velocity(
     wanted: Vector,
     rows: np.ndarray,
     bounds: np.ndarray,
-    u: Numbers,
+    u: Vector,
     speed: float,
     turning: float,
 ) -> tuple[Vector, float]:
@@ -120,7 +120,7 @@ def nearest_velocity(
 
 
 @compiled
-def greatest_rate(row: Numbers, u: Numbers, speed: float, turning: float) -> float:
+def greatest_rate(row: Vector, u: Vector, speed: float, turning: float) -> float:
     """The greatest row . v within the speeds, m/s."""
     lengthwise, side = dot(row, u), norm(across(row, u))
     size = sqrt(lengthwise * lengthwise + side * side)

@@ -18,7 +18,7 @@ class ReachLimits:
         most=0.1,
     )
     max_insertion: float = parameter(
-        0.2, "greatest length of shaft inside", "m", above=0.0, most=0.5
+        0.2, "greatest length of shaft inside the patient", "m", above=0.0, most=0.5
     )
     max_tilt: float = parameter(
         0.7, "greatest angle of the shaft to the vertical", "rad", above=0.0, most=pi

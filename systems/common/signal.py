@@ -72,7 +72,8 @@ class Many:
 
     Attributes:
         signal: What each row is.
-        names: Of the rows: a field `x` is in the columns `x_NAME`.
+        names: Of the rows: a field `x` is in the columns `x_NAME`, a column without
+            a name of its own in NAME.
     """
 
     signal: Any
@@ -107,7 +108,8 @@ def columns(signal: Any) -> tuple[str, ...]:
     """Names of a signal's elements, as the log has them."""
     if isinstance(signal, Many):
         parts = columns(signal.signal)
-        return tuple(f"{part}_{name}" for name in signal.names for part in parts)
+        joined = [f"{part}_{name}" for name in signal.names for part in parts]
+        return tuple(column.removeprefix("_") for column in joined)
     named = fields(signal).items()
     return tuple(column for name, field in named for column in field.names(name))
 
@@ -127,7 +129,9 @@ def example(signal: Any) -> Any:
 
 def flat(value: Any) -> np.ndarray:
     """A signal's value as a port has it: one element after the other."""
-    return np.concatenate([np.ravel(part).astype(float) for part in value])
+    if isinstance(value, tuple):
+        return np.concatenate([flat(part) for part in value])
+    return np.ravel(value).astype(float)
 
 
 def view(signal: Any, array: np.ndarray) -> Any:
@@ -150,11 +154,6 @@ def view(signal: Any, array: np.ndarray) -> Any:
         parts.append(array[..., first if field.is_number else slice(first, last)])
         first = last
     return signal(*parts)
-
-
-def rows(many: Many, array: np.ndarray) -> list[Any]:
-    """The rows of an array of many things, each of numbers only, as their signals."""
-    return [*map(many.signal._make, array.reshape(len(many.names), -1).tolist())]
 
 
 def reading(signal: Any, array: str, first: int = 0) -> str:
@@ -189,6 +188,14 @@ def row_writer(signal: Any) -> Any:
     parts = enumerate(elements(signal, "value"))
     body = "".join(f"    rows[i, {k}] = {part}\n" for k, part in parts)
     return generated(f"def {name}(rows, i, value):\n{body}", name, signal, {})
+
+
+def writer(signal: Any) -> Any:
+    """A compiled function that makes an array of a signal's elements."""
+    name = f"write_{signal.__name__}"
+    parts = ", ".join(elements(signal, "value"))
+    source = f"def {name}(value):\n    return np.array(({parts},))\n"
+    return generated(source, name, signal, {"np": np})
 
 
 def finiteness(signal: Any) -> Any:

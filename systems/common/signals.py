@@ -5,8 +5,10 @@ Those of one room alone are declared beside their block. World frame W, SI units
 
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from systems.common.compiled import compiled
-from systems.common.signal import AXES, Field, Vector, finiteness
+from systems.common.signal import AXES, Field, Vector, finiteness, reader
 
 
 class RobotTool(NamedTuple):
@@ -147,6 +149,7 @@ class Fulcrum(NamedTuple):
     refused: Annotated[float, Field("1", "how many samples were refused", 0.0)]
 
 
+read_estimate = reader(Estimate)
 finite_estimate = finiteness(Estimate)
 finite_guide = finiteness(Guide)
 finite_tool = finiteness(RobotTool)
@@ -158,3 +161,12 @@ finite_permission = finiteness(Permission)
 def usable(estimate: Estimate) -> bool:
     """True if the estimator knows the tool and gives numbers only."""
     return estimate.known > 0.5 and finite_estimate(estimate)
+
+
+@compiled
+def all_usable(estimates: np.ndarray) -> bool:
+    """True if every tool's estimate (n, 17) is usable."""
+    good = True
+    for i in range(len(estimates)):
+        good = good and usable(read_estimate(estimates[i]))
+    return good

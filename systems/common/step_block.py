@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 import hashlib
 from itertools import pairwise
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,8 @@ def _taken(signal: Any, array: str) -> str:
 def _given(signal: Any, value: str, first: int) -> list[str]:
     if isinstance(signal, int):
         return [f"array[{first}:{first + signal}] = {value}"]
+    if isinstance(signal, Many):
+        return [f"array[{first}:{first + size(signal)}] = {value}.ravel()"]
     parts = enumerate(elements(signal, value), first)
     return [f"array[{i}] = {part}" for i, part in parts]
 
@@ -196,17 +199,14 @@ class StepBlock(Block):
         """The step as a function of the context, and the tickets of what it reads."""
         run = wired(step, len(constants), states, list(inputs.values()), gives, timed)
         ports = {name: self.signal_in(name, inputs[name]) for name in inputs}
-        reads = [_reader(ports[name], defaults.get(name)) for name in inputs]
-        groups = range(len(states))
+        reads: list[Callable[[Any], Any]] = [
+            *(_state_reader(group) for group in range(len(states))),
+            *([methodcaller("get_time")] if timed else []),
+            *(_port_reader(ports[name], defaults.get(name)) for name in inputs),
+        ]
 
         def of_context(context: Any) -> np.ndarray:
-            time = (context.get_time(),) if timed else ()
-            return run(
-                *constants,
-                *[context.get_discrete_state(group).value() for group in groups],
-                *time,
-                *[read(context) for read in reads],
-            )
+            return run(*constants, *[read(context) for read in reads])
 
         tickets = {port.ticket() for port in ports.values()}
         return of_context, tickets | ({self.time_ticket()} if timed else set())
@@ -224,7 +224,17 @@ class StepBlock(Block):
             first = last
 
 
-def _reader(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
+def _state_reader(group: int) -> Callable[[Any], np.ndarray]:
+    """What reads a group of discrete state without a copy."""
+
+    def read(context: Any) -> np.ndarray:
+        state: np.ndarray = context.get_discrete_state(group).value()
+        return state
+
+    return read
+
+
+def _port_reader(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
     """What reads a port; its default, if it has one, where it is not connected."""
     read: Callable[[Any], np.ndarray] = port.Eval
     if default is None:

@@ -33,7 +33,7 @@ from systems.common.geometry import (
 )
 from systems.common.parameter import Rules, check, parameter
 from systems.common.reach_limits import ReachLimits
-from systems.common.signal import Field, Vector, example, vector
+from systems.common.signal import Field, Many, Vector, example, vector
 from systems.common.signals import (
     FREE,
     Estimate,
@@ -43,10 +43,12 @@ from systems.common.signals import (
     ToolMotion,
     Velocity,
     ViewCone,
+    all_usable,
     finite_cone,
     finite_guide,
     finite_permission,
     finite_tool,
+    read_estimate,
 )
 from systems.common.step_block import StepBlock
 from systems.common.stops import Stop
@@ -199,22 +201,27 @@ def why_stop(
     v_R: Velocity,
     guide: Guide,
     robot: RobotTool,
-    obstacle: Estimate,
+    obstacles: np.ndarray,
     target: Estimate,
     view_cone: ViewCone,
     permission: Permission,
     p: Vector,
 ) -> Stop:
     """Why the tool must stop, or MOVING; the block's inputs and the commanded tip."""
-    if target.sigma_p >= NEVER_SEEN or obstacle.sigma_p >= NEVER_SEEN:
+    unseen, lost = target.sigma_p >= NEVER_SEEN, False
+    for i in range(len(obstacles)):
+        obstacle = read_estimate(obstacles[i])
+        unseen = unseen or obstacle.sigma_p >= NEVER_SEEN
+        lost = lost or obstacle.known < 0.5
+    if unseen:
         return Stop.WAITING
     if target.known < 0.5:
         return Stop.TARGET_LOST
-    if obstacle.known < 0.5:
+    if lost:
         return Stop.OBSTACLE_LOST
     numbers = all_finite(v_R.v) and finite_guide(guide) and finite_tool(robot)
     numbers = numbers and finite_cone(view_cone) and finite_permission(permission)
-    if not (numbers and all_finite(target.p)):
+    if not (numbers and all_finite(target.p) and all_usable(obstacles)):
         return Stop.NOT_A_NUMBER
     if not reachable(params, robot.fulcrum, target.p):
         return Stop.OUT_OF_REACH
@@ -234,7 +241,7 @@ def _update(
     v_R: Velocity,
     guide: Guide,
     robot: RobotTool,
-    obstacle: Estimate,
+    obstacles: np.ndarray,
     target: Estimate,
     view_cone: ViewCone,
     permission: Permission,
@@ -242,7 +249,7 @@ def _update(
     # The tip has moved on since the last instant.
     p = along(tool.tip, time - tool.time, tool.v)
     reason = why_stop(
-        params, v_R, guide, robot, obstacle, target, view_cone, permission, p
+        params, v_R, guide, robot, obstacles, target, view_cone, permission, p
     )
     code, moves = float(reason.value), reason == Stop.MOVING
     if moves and permission.speed_scale <= 0.0:
@@ -274,7 +281,7 @@ class ToolNavigation(StepBlock):
 
     Port ``robot_tool`` accepts the `RobotTool`, its tip as measured.
 
-    Port ``obstacle`` accepts the `Estimate` of the obstacle tool O.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool.
 
     Port ``target`` accepts the `Estimate` of the target tool S.
 
@@ -293,8 +300,16 @@ class ToolNavigation(StepBlock):
         params: ToolNavigationParams | None = None,
         p_WP: Sequence[float] = START.tip,
         p_WG: Sequence[float] = START.fulcrum,
+        obstacles: Sequence[str] = ("obstacle",),
     ) -> None:
-        """Makes the block with the tool's tip at p_WP and its fulcrum at p_WG [m]."""
+        """Makes the block.
+
+        Args:
+            params: Parameters; the defaults if None.
+            p_WP: The tool's tip at the start [m].
+            p_WG: Its fulcrum at the start [m].
+            obstacles: Names of the obstacle tools.
+        """
         super().__init__()
         params = params or ToolNavigationParams()
         still = (0.0, 0.0, 0.0)
@@ -307,7 +322,7 @@ class ToolNavigation(StepBlock):
                 "v_R": Velocity,
                 "guide": Guide,
                 "robot_tool": RobotTool,
-                "obstacle": Estimate,
+                "obstacles": Many(Estimate, tuple(obstacles)),
                 "target": Estimate,
                 "view_cone": ViewCone,
                 "permission": Permission,

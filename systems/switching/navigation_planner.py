@@ -9,11 +9,15 @@ import numpy as np
 
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
-from systems.common.signal import rows
+from systems.common.compiled import compiled
+from systems.common.signal import reader, size
 from systems.switching.signals import SEEN, Goal, Mode, PlanarVelocity, Seen
 
 PERIOD = 0.05
 """Of all planners, in s."""
+
+SEEN_SIZE = size(Seen)
+read_seen = reader(Seen)
 
 
 class Planned(NamedTuple):
@@ -22,6 +26,20 @@ class Planned(NamedTuple):
     v_R: PlanarVelocity
     mode: Mode
     memory: Sequence[Any] = ()
+
+
+@compiled
+def in_sight(
+    robot: np.ndarray, goal: np.ndarray, seen: np.ndarray
+) -> tuple[bool, np.ndarray]:
+    """Whether all numbers are finite; the rows of `Seen` that hold an obstacle."""
+    rows = seen.reshape((len(seen) // SEEN_SIZE, SEEN_SIZE))
+    there, count = np.empty_like(rows), 0
+    for k in range(len(rows)):
+        if read_seen(rows[k]).track >= 0.0:
+            there[count] = rows[k]
+            count += 1
+    return isfinite(robot.sum() + goal.sum() + seen.sum()), there[:count]
 
 
 class NavigationPlanner(Block):
@@ -40,28 +58,31 @@ class NavigationPlanner(Block):
         self._robot = self.signal_in("robot", RobotState)
         self._seen = self.signal_in("seen", SEEN)
         self._goal = self.signal_in("goal", Goal)
-        rest = (PlanarVelocity(0.0, 0.0), Mode())
-        for name, signal in zip(("v_R", "mode"), rest, strict=True):
-            self.state_out(name, type(signal), np.array(signal))
-        for part in memory:
-            self.DeclareDiscreteState([*part])
-        self._kinds = [type(part) for part in (*rest, *memory)]
+        self.state_out("v_R", PlanarVelocity, np.zeros(size(PlanarVelocity)))
+        self._mode = self.state_out("mode", Mode, np.array(Mode()))
+        self._memory = [self.DeclareDiscreteState([*part]) for part in memory]
+        self._kinds = [PlanarVelocity, Mode, *map(type, memory)]
         self.update_every(period, self._update)
 
     def _update(self, context: Any) -> Sequence[Any]:
-        robot = RobotState(*self._robot.Eval(context).tolist())
-        goal = Goal(*self._goal.Eval(context).tolist())
-        seen = rows(SEEN, self._seen.Eval(context))
-        state = context.get_discrete_state
-        _, mode, *memory = (
-            kind(*state(group).value().tolist())
-            for group, kind in enumerate(self._kinds)
-        )
-        if not isfinite(sum(robot) + sum(goal) + sum(map(sum, seen))):
-            return PlanarVelocity(0.0, 0.0), mode, *memory
-        there = [obstacle for obstacle in seen if obstacle.track >= 0.0]
-        planned = self.plan(robot, goal, there, *memory)
-        return planned.v_R, planned.mode, *planned.memory
+        robot, goal = self._robot.Eval(context), self._goal.Eval(context)
+        known, there = in_sight(robot, goal, self._seen.Eval(context))
+        memory = [self._held(context, group) for group in self._memory]
+        if known:
+            planned = self.plan(
+                RobotState(*robot.tolist()),
+                Goal(*goal.tolist()),
+                [*map(Seen._make, there.tolist())],
+                *memory,
+            )
+        else:
+            mode = self._held(context, self._mode)
+            planned = Planned(PlanarVelocity(0.0, 0.0), mode, memory)
+        # Drake takes an array over ten times faster than a tuple.
+        return [*map(np.array, (planned.v_R, planned.mode, *planned.memory))]
+
+    def _held(self, context: Any, group: int) -> Any:
+        return self._kinds[group](*context.get_discrete_state(group).value().tolist())
 
     @abstractmethod
     def plan(

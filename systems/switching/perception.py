@@ -4,19 +4,23 @@ Section 1.2 of the thesis: an obstacle is seen if its centre is at most R_v away
 How velocities are perceived is left open there; here they are measured.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any
+
+import numpy as np
 
 from plants.crowd.signals import OBSTACLES, Obstacle
 from plants.turtlebot.turtlebot import RobotState
-from systems.common.block import Block
+from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
-from systems.common.signal import rows
+from systems.common.signal import finiteness, reader, size
+from systems.common.step_block import StepBlock
 from systems.switching.signals import NOISE, SEEN, Noise, Seen
 
-NOTHING = Seen(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+SEEN_SIZE = size(Seen)
+read_obstacle = reader(Obstacle)
+read_noise = reader(Noise)
+finite_obstacle = finiteness(Obstacle)
 
 
 @dataclass
@@ -36,39 +40,38 @@ class PerceptionParams:
     )
 
 
+@compiled
 def perceive(
-    params: PerceptionParams,
-    robot: RobotState,
-    obstacles: Sequence[Obstacle],
-    noise: Sequence[Noise],
-) -> list[Seen]:
+    params: Any, robot: RobotState, obstacles: np.ndarray, noise: np.ndarray
+) -> tuple[np.ndarray]:
     """What is seen of each obstacle.
 
     Args:
-        params: Parameters.
+        params: A record of `PerceptionParams`.
         robot: The body.
-        obstacles: What there is. One that is not known in finite numbers counts as
-            in sight, and stops who plans with it.
-        noise: Four standard normal numbers for each.
+        obstacles: Rows of `Obstacle`. One that is not known in finite numbers counts
+            as in sight, and stops who plans with it.
+        noise: Rows of `Noise`, one for each: four standard normal numbers.
+
+    Returns:
+        Rows of `Seen`.
     """
+    seen = np.zeros((len(obstacles), SEEN_SIZE))
     reach = params.vision * params.vision
     s, w = params.position_noise, params.velocity_noise
-    seen = []
-    for track, ((x, y, radius, v_x, v_y), e) in enumerate(
-        zip(obstacles, noise, strict=True)
-    ):
-        near = radius > 0.0 and (x - robot.x) ** 2 + (y - robot.y) ** 2 <= reach
-        if near or not isfinite(x + y + radius + v_x + v_y):
-            place = x + s * e.x, y + s * e.y
-            seen.append(
-                Seen(float(track), *place, radius, v_x + w * e.v_x, v_y + w * e.v_y)
-            )
-        else:
-            seen.append(NOTHING)
-    return seen
+    for track in range(len(obstacles)):
+        o, e = read_obstacle(obstacles[track]), read_noise(noise[track])
+        row = Seen(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        near = o.radius > 0.0 and (o.x - robot.x) ** 2 + (o.y - robot.y) ** 2 <= reach
+        if near or not finite_obstacle(o):
+            x, y = o.x + s * e.x, o.y + s * e.y
+            v_x, v_y = o.v_x + w * e.v_x, o.v_y + w * e.v_y
+            row = Seen(float(track), x, y, o.radius, v_x, v_y)
+        seen[track, :] = row
+    return (seen,)
 
 
-class Perception(Block):
+class Perception(StepBlock):
     """Sees the obstacles whose centres lie within the disc of radius R_v.
 
     Section 3.1.1 of the thesis. An obstacle keeps its track identity for ever.
@@ -86,21 +89,12 @@ class Perception(Block):
             ParameterError: If a parameter is out of range.
         """
         super().__init__()
-        self.params = params or PerceptionParams()
-        check(self.params)
-        self._robot = self.signal_in("robot", RobotState)
-        self._obstacles = self.signal_in("obstacles", OBSTACLES)
-        self._noise = self.signal_in("noise", NOISE)
-        ports = (self._robot, self._obstacles, self._noise)
-        self.signal_out(
-            "seen", SEEN, self._calc_seen, {port.ticket() for port in ports}
+        params = params or PerceptionParams()
+        check(params)
+        self.declare_map(
+            perceive,
+            [packed(params)],
+            {"robot": RobotState, "obstacles": OBSTACLES, "noise": NOISE},
+            "seen",
+            SEEN,
         )
-
-    def _calc_seen(self, context: Any) -> list[float]:
-        seen = perceive(
-            self.params,
-            RobotState(*self._robot.Eval(context).tolist()),
-            rows(OBSTACLES, self._obstacles.Eval(context)),
-            rows(NOISE, self._noise.Eval(context)),
-        )
-        return [number for row in seen for number in row]

@@ -6,15 +6,22 @@ drives with the part of the speed that points there.
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, isfinite, pi, sqrt
+from math import atan2, cos, hypot, pi, sqrt
 from typing import Any
 
+import numpy as np
+
 from plants.turtlebot.turtlebot import Command, RobotState
-from systems.common.block import Block
+from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
+from systems.common.signal import finiteness
+from systems.common.step_block import StepBlock
 from systems.switching.signals import Mode, PlanarVelocity
 
 TWO_PI = 2.0 * pi
+finite_robot = finiteness(RobotState)
+finite_velocity = finiteness(PlanarVelocity)
+finite_mode = finiteness(Mode)
 
 
 @dataclass
@@ -38,17 +45,14 @@ class UnicycleControlParams:
     )
 
 
+@compiled
 def heading_law(
-    params: UnicycleControlParams,
-    theta: float,
-    vx: float,
-    vy: float,
-    retreat: bool = False,
+    params: Any, theta: float, vx: float, vy: float, retreat: bool
 ) -> Command:
     """Speed and turn rate towards a velocity.
 
     Args:
-        params: Parameters.
+        params: A record of `constants`.
         theta: Heading of the body [rad].
         vx: Wanted velocity, x [m/s].
         vy: Wanted velocity, y [m/s].
@@ -72,7 +76,22 @@ def heading_law(
     return Command(speed, turn if error >= 0.0 else -turn)
 
 
-class UnicycleControl(Block):
+@compiled
+def _control(
+    params: Any, robot: RobotState, v: PlanarVelocity, mode: Mode
+) -> tuple[Command]:
+    if finite_robot(robot) and finite_velocity(v) and finite_mode(mode):
+        return (heading_law(params, robot.theta, v.x, v.y, mode.retreat > 0.5),)
+    return (Command(0.0, 0.0),)
+
+
+def constants(params: UnicycleControlParams) -> np.ndarray:
+    """The parameters as the compiled functions take them."""
+    check(params)
+    return packed(params)
+
+
+class UnicycleControl(StepBlock):
     """The control law of the robot, section 3.1.2 of the thesis.
 
     Where an input is not finite, the robot is to stand.
@@ -90,19 +109,10 @@ class UnicycleControl(Block):
             ParameterError: If a parameter is out of range.
         """
         super().__init__()
-        self.params = params or UnicycleControlParams()
-        check(self.params)
-        signals = {"robot": RobotState, "v_R": PlanarVelocity, "mode": Mode}
-        self._ports = [self.signal_in(name, signals[name]) for name in signals]
-        self._signals = [*signals.values()]
-        inputs = {port.ticket() for port in self._ports}
-        self.signal_out("command", Command, self._calc_command, inputs)
-
-    def _calc_command(self, context: Any) -> Command:
-        robot, v, mode = (
-            signal(*port.Eval(context).tolist())
-            for signal, port in zip(self._signals, self._ports, strict=True)
+        self.declare_map(
+            _control,
+            [constants(params or UnicycleControlParams())],
+            {"robot": RobotState, "v_R": PlanarVelocity, "mode": Mode},
+            "command",
+            Command,
         )
-        if not isfinite(sum(robot) + sum(v) + sum(mode)):
-            return Command(0.0, 0.0)
-        return heading_law(self.params, robot.theta, v.x, v.y, mode.retreat > 0.5)

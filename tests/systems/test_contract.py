@@ -203,7 +203,7 @@ LEAD = {"ProcedurePlayer", "TipReference"}
 BROKEN = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf}
 GO_ON = {
     *("ClearanceConstraint.guide", "ClearanceConstraint.robot_tool"),
-    *("ClearanceConstraint.obstacle", "ClearanceConstraint.target"),
+    *("ClearanceConstraint.obstacles", "ClearanceConstraint.target"),
     *("ClearanceConstraint.camera", "ClearanceConstraint.view_cone"),
     *("ClearanceConstraint.permission", "ToolBypass.camera"),
 }

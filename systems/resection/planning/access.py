@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from plants.snake.parameters import SnakeParams
-from plants.tissue.tissue import TUMOUR, Tissue
+from plants.tissue.labels import TUMOUR
+from plants.tissue.tissue import Tissue
 from plants.tissue.volume import Access, make_volume
 from systems.resection.planning.reach import find_reach
 from systems.resection.planning.session import Session

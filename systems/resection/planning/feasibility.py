@@ -15,21 +15,22 @@ from plants.snake.inverse_kinematics import positioning
 from plants.snake.last_module import meridian
 from plants.snake.parameters import SnakeParams
 from plants.snake.reachability import refusal
-from plants.snake.snake_body import BODY, TOOL
+from plants.snake.snake_body import BODY, PLATE, TOOL
+from plants.tissue.labels import CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import OUTSIDE, nearest_in_ball
-from plants.tissue.volume import CAP, CHANNEL, CRITICAL, TUMOUR, Volume
+from plants.tissue.volume import Volume
 from systems.resection.planning.entry_law import least_clearance
 from systems.resection.planning.procedure import ENTRY, Procedure, widest_bend
 
 TOOL_OUTSIDE = "tool outside"
 NEVER = "never freed"
 TOO_LATE = "freed too late"
-BRAIN = "brain"
+IN_BRAIN = "brain"
 WALL = "channel wall"
 NEAR_CRITICAL = "critical"
 LIMIT = "limit"
 JAM = "jam"
-REASONS = (TOOL_OUTSIDE, NEVER, TOO_LATE, BRAIN, WALL, NEAR_CRITICAL, LIMIT, JAM)
+REASONS = (TOOL_OUTSIDE, NEVER, TOO_LATE, IN_BRAIN, WALL, NEAR_CRITICAL, LIMIT, JAM)
 
 PARTS = (
     "the shaft in the channel",
@@ -201,7 +202,7 @@ def explain(
     )
     at = int(voxel) if voxel != OUTSIDE else int(why[5])
     gap = max(float(why[4]) - distance, 0.0) if math.isfinite(distance) else 0.0
-    if PARTS[int(why[0])] == "the last plate":
+    if int(why[0]) == PLATE:
         at = int(why[5])
         gap = plate_gap(volume.centre_of(at), why, face) if at >= 0 else gap
     where = volume.centre_of(at) if at >= 0 else why[1:4]
@@ -225,7 +226,7 @@ def explain(
     elif in_wall:
         reason, text = WALL, "meets the wall of the channel"
     else:
-        reason, text = BRAIN, "meets the brain"
+        reason, text = IN_BRAIN, "meets the brain"
     return refused(
         reason, where, gap, f"{part} {text} at {place(where)}, by {1e3 * gap:.2f} mm"
     )

@@ -7,9 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.snake.snake_body import TOOL
+from plants.snake.snake_body import BALL
+from plants.tissue.labels import BRAIN, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
-from plants.tissue.volume import CRITICAL, TUMOUR
+from systems.resection.planning.feasibility import (
+    IN_BRAIN,
+    LIMIT,
+    NEAR_CRITICAL,
+    NEVER,
+    TOOL_OUTSIDE,
+)
 from systems.resection.planning.session import Session
 from systems.resection.planning.sweep import straightened, try_procedure
 from systems.resection.planning.tree import nearest_nodes
@@ -86,7 +93,7 @@ def feasibility_map(
     x = np.empty(7)
     for n, p in enumerate(points):
         nearest_nodes(tree, p[0], p[1], p[2], found, far)
-        reason = "limit"
+        reason = LIMIT
         for node, turn in product(found[found >= 0], TURNS):
             if not straightened(body, tree.x[node], p, turn, x):
                 continue
@@ -105,9 +112,9 @@ def feasibility_map(
 def _reason(session: Session, part: int) -> str:
     """What the culprit of the last failure is, in a word."""
     at = int(session.why[5])
-    label = session.volume.labels.reshape(-1)[at] if at >= 0 else 0
+    label = session.volume.labels.reshape(-1)[at] if at >= 0 else BRAIN
     if label == CRITICAL:
-        return "critical"
-    if part == 8 or part == TOOL:
-        return "tool outside"
-    return "never freed" if label == TUMOUR else "brain"
+        return NEAR_CRITICAL
+    if part == BALL:
+        return TOOL_OUTSIDE
+    return NEVER if label == TUMOUR else IN_BRAIN

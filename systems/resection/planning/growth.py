@@ -15,6 +15,7 @@ from plants.snake.inverse_kernels import solve_tools
 from plants.snake.snake_body import corners, drive_far
 from plants.tissue.space import FREE, SOLID, count_solid, first_forbidden, roll_back
 from systems.common.compiled import compiled
+from systems.resection.planning.draws import Draws, below, normal, uniform
 from systems.resection.planning.tree import add_node, extend, nearest_nodes, visit
 
 NEAR = 12
@@ -28,10 +29,10 @@ WAYS = 3
 
 
 @compiled
-def tilted(n: Any, spread: float, out: Any) -> None:
+def tilted(d: Draws, n: Any, spread: float, out: Any) -> None:
     """An axis turned at random, by about `spread` rad in either direction."""
     for r in range(3):
-        out[r] = n[r] + spread * np.random.normal()
+        out[r] = n[r] + spread * normal(d)
     size = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
     for r in range(3):
         out[r] /= size
@@ -50,12 +51,6 @@ def centre(s: Any, voxel: int, out: Any) -> None:
 def distance2(p: Any, q: Any) -> float:
     """Square of the distance between two points."""
     return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
-
-
-@compiled
-def seed_random(seed: int) -> None:
-    """Seeds the random numbers of compiled functions."""
-    np.random.seed(seed)
 
 
 @compiled
@@ -79,6 +74,7 @@ def grow(
     s: Any,
     b: Any,
     t: Any,
+    draws: Draws,
     wanted: Any,
     tries: Any,
     attempts: int,
@@ -93,6 +89,7 @@ def grow(
         s: The space.
         b: The body.
         t: The tree.
+        draws: Where random numbers come from.
         wanted: Flat indices of voxels to reach.
         tries: Failed attempts so far, int32, one a wanted voxel.
         attempts: How many to make.
@@ -115,7 +112,7 @@ def grow(
         pick, least_far = -1, math.inf
         here = t.route[t.size[1] - 1]
         for _ in range(6):
-            at = np.random.randint(len(wanted))
+            at = below(draws, len(wanted))
             if s.tau[wanted[at]] != SOLID or tries[at] >= weary:
                 continue
             away = 1.0 + tries[at]
@@ -131,8 +128,8 @@ def grow(
         # Of some places that hold the voxel the one where most is left.
         most = 0
         for _ in range(PLACES):
-            tilted(zero, 1.0, d)
-            r = b.radius * np.random.random() ** (1 / 3)
+            tilted(draws, zero, 1.0, d)
+            r = b.radius * uniform(draws) ** (1 / 3)
             q0, q1, q2 = v[0] + r * d[0], v[1] + r * d[1], v[2] + r * d[2]
             if first_forbidden(s, q0, q1, q2, b.radius) == FREE:
                 there = count_solid(s, q0, q1, q2, b.frees)
@@ -147,7 +144,7 @@ def grow(
             continue  # not yet: the frontier is far from here
         close = moving and distance2(p[0], t.tip[here]) < (3 * b.radius) ** 2
         for way in range(WAYS):
-            node = found[int(NEAR * np.random.random() ** 2)]
+            node = found[int(NEAR * uniform(draws) ** 2)]
             if node < 0:
                 node = found[0]
             if way == 0 and close:
@@ -156,9 +153,9 @@ def grow(
             for r in range(3):
                 n[0, r] = (c[6, r] - c[5, r]) / (2 * b.h)
                 m[0, r] = (c[4, r] - c[3, r]) / (2 * b.h)
-            spread = 0.5 * np.random.random() ** 2
-            tilted(n[0].copy(), spread, n[0])
-            tilted(m[0].copy(), spread, m[0])
+            spread = 0.5 * uniform(draws) ** 2
+            tilted(draws, n[0].copy(), spread, n[0])
+            tilted(draws, m[0].copy(), spread, m[0])
             if not tool_posture(b, p, n, m, x):
                 continue
             freed, roomed = s.used[0], s.used[1]

@@ -21,10 +21,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, corners
+from plants.tissue.labels import BRAIN, CRITICAL, NAMES, TUMOUR
 from plants.tissue.space import FREE, SOLID, first_forbidden
-from plants.tissue.volume import CRITICAL, NAMES, TUMOUR, Volume
+from plants.tissue.volume import Volume
 from systems.common.archive import read_archive, write_archive
-from systems.resection.planning.growth import grow, seed_random, tilted, tool_posture
+from systems.resection.planning.draws import Draws, new_draws
+from systems.resection.planning.growth import grow, tilted, tool_posture
 from systems.resection.planning.session import Session
 from systems.resection.planning.tree import grown, new_tree
 
@@ -94,7 +96,7 @@ def find_reach(
     start = perf_counter()
     volume, body = session.volume.fresh(), body_of(session.params)
     s, why = volume.space(), np.zeros(CULPRIT)
-    seed_random(seed)
+    draws = new_draws(seed)
     tree = new_tree(session.home, session.tree.tip[0], ROUND, ROUND)
     tumour = (volume.labels == TUMOUR).reshape(-1)
     opening = _opening(volume, body.radius).reshape(-1)
@@ -107,7 +109,7 @@ def find_reach(
     history = [0]
     while len(wanted):
         tree = grown(tree, ROUND, ROUND)
-        grow(s, body, tree, wanted, tries, ROUND, weary, 3, False, why)
+        grow(s, body, tree, draws, wanted, tries, ROUND, weary, 3, False, why)
         left = (s.tau[wanted] == SOLID) & (tries < weary)
         wanted, tries = wanted[left], tries[left]
         history.append(int(s.used[0]))
@@ -118,7 +120,9 @@ def find_reach(
                 break
     mask = volume.resected
     fraction = float(np.count_nonzero(mask)) / total
-    lumps = _lumps(session, volume, opening.reshape(mask.shape)) if explain else []
+    lumps = []
+    if explain:
+        lumps = _lumps(session, volume, opening.reshape(mask.shape), draws)
     return Reach(mask, fraction, perf_counter() - start, int(tree.size[0]), lumps)
 
 
@@ -164,7 +168,9 @@ TOO_NARROW = "too narrow for the tool"
 NO_WAY = "no way there was found"
 
 
-def _lumps(session: Session, volume: Volume, opening: NDArray[np.bool_]) -> list[Lump]:
+def _lumps(
+    session: Session, volume: Volume, opening: NDArray[np.bool_], draws: Draws
+) -> list[Lump]:
     """What stays, part by part, with reasons."""
     stays = (volume.labels == TUMOUR) & (volume.tau == SOLID)
     parts, count = ndimage.label(stays, np.ones((3, 3, 3)))
@@ -173,7 +179,7 @@ def _lumps(session: Session, volume: Volume, opening: NDArray[np.bool_]) -> list
     sizes = np.bincount(parts.ravel(), minlength=count + 1)
     boxes = ndimage.find_objects(parts)
     found = []
-    order = np.argsort(sizes[1:])[::-1]
+    order = np.argsort(sizes[1:], kind="stable")[::-1]
     for n in order:
         box = boxes[n]
         mask = parts[box] == n + 1
@@ -181,7 +187,7 @@ def _lumps(session: Session, volume: Volume, opening: NDArray[np.bool_]) -> list
         points = volume.origin + volume.spacing * (np.argwhere(mask) + corner)
         if sizes[n + 1] * volume.voxel < 2e-9:
             break
-        reason = _reason(session, volume, points, mask, box, opening)
+        reason = _reason(session, volume, points, mask, box, opening, draws)
         centre = points.mean(axis=0).tolist()
         found.append(Lump(float(sizes[n + 1]) * volume.voxel, centre, reason))
     return found
@@ -194,6 +200,7 @@ def _reason(
     mask: NDArray[np.bool_],
     box: tuple[slice, ...],
     opening: NDArray[np.bool_],
+    draws: Draws,
 ) -> str:
     """What keeps the robot from most of a lump."""
     critical = mask & (volume.allowed[box] == 0)
@@ -214,8 +221,8 @@ def _reason(
         if first_forbidden(s, p[0, 0], p[0, 1], p[0, 2], body.radius) != FREE:
             blame[TOO_NARROW] += 1
             continue
-        tilted(np.array([0.0, 0.0, 1.0]), 0.8, n[0])
-        tilted(n[0].copy(), 0.6, m[0])
+        tilted(draws, np.array([0.0, 0.0, 1.0]), 0.8, n[0])
+        tilted(draws, n[0].copy(), 0.6, m[0])
         if not tool_posture(body, p, n, m, x):
             blame["beyond the robot's bends"] += 1
             continue
@@ -224,7 +231,7 @@ def _reason(
             blame[NO_WAY] += 3
             continue
         at = int(why[5])
-        label = int(volume.labels.reshape(-1)[at]) if at >= 0 else 0
+        label = int(volume.labels.reshape(-1)[at]) if at >= 0 else BRAIN
         if label == TUMOUR:
             blame["the body would need tumour gone that stays"] += 1
         elif label == CRITICAL:

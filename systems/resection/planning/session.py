@@ -13,6 +13,7 @@ from plants.tissue.critical import Boxes
 from plants.tissue.space import roll_back
 from plants.tissue.volume import Volume
 from systems.common.archive import read_archive, write_archive
+from systems.common.parameter import check
 from systems.resection.planning.feasibility import (
     NEVER,
     Answer,
@@ -25,6 +26,7 @@ from systems.resection.planning.feasibility import (
 from systems.resection.planning.procedure import (
     ENTRY,
     Procedure,
+    check_procedure,
     procedure_of,
     widest_bend,
     with_tool,
@@ -96,7 +98,7 @@ class Session:
     concluded: str = ""
 
     def __post_init__(self) -> None:
-        self.params.check()
+        check(self.params)
         self.body: Body = body_of(self.params, self.clearance, self.accuracy)
         self.home = home_posture(self.volume, self.params)
         c = np.empty((8, 3))
@@ -173,7 +175,7 @@ class Session:
         self.volume.forget_journals()
         self.make_room()
         self._mark = (0, 0, int(self.tree.size[0]), int(self.tree.size[1]))
-        procedure.check(self.params)
+        check_procedure(procedure, self.params)
         params = with_tool(self.params, procedure.tool)
         body = self.body
         if procedure.tool is not None:

@@ -11,33 +11,30 @@ from numpy.typing import ArrayLike, NDArray
 from plants.snake.kinematics import frames
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 from systems.resection.wires.resection_ik import from_universal
 
 
 @dataclass
 class ProcedurePlayerParams:
-    """Parameters of `ProcedurePlayer`.
+    """Parameters of `ProcedurePlayer`."""
 
-    Attributes:
-        lead: How far ahead of time ``target`` is, the control period, in s.
-        bend_rate: Largest rate of a or b of a ball, in rad/s.
-        travel_rate: Largest speed of the translation, in m/s.
-        dwell: At the beginning and at the end, in s.
-    """
-
-    lead: float = 0.02
-    bend_rate: float = 1.2
-    travel_rate: float = 0.010
-    dwell: float = 0.3
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(
-                    f"procedure_player.{name}={value}: expected > 0; the default is "
-                    f"{getattr(ProcedurePlayerParams(), name)}"
-                )
+    lead: float = parameter(
+        0.02,
+        "how far ahead of time `target` is, the control period",
+        "s",
+        least=1e-3,
+        most=0.1,
+    )
+    bend_rate: float = parameter(
+        1.2, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+    )
+    travel_rate: float = parameter(
+        0.010, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+    )
+    dwell: float = parameter(
+        0.3, "at the beginning and at the end", "s", above=0.0, most=60.0
+    )
 
 
 def schedule(x: NDArray[np.float64], params: ProcedurePlayerParams) -> NDArray:
@@ -91,9 +88,8 @@ class ProcedurePlayer(Block):
                 have been played.
         """
         super().__init__()
-        self._params = params or ProcedurePlayerParams()
-        self._params.check()
-        self._snake = (snake or SnakeParams()).check()
+        self._params = check(params or ProcedurePlayerParams())
+        self._snake = check(snake or SnakeParams())
         if postures is None:
             postures = [[0.0] * 7, [0.002, 0.0, 0.1, 0.0, 0.1, 0.2, 0.1]]
         self._x = np.array(postures, float)

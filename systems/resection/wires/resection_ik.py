@@ -8,6 +8,7 @@ from typing import Any
 from plants.snake.inverse_kinematics import REACHED, tool_posture
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 
 HOLD = -1
 """Status of an input that is no pose at all."""
@@ -15,26 +16,15 @@ HOLD = -1
 
 @dataclass
 class ResectionIkParams:
-    """Parameters of `ResectionIk`.
+    """Parameters of `ResectionIk`."""
 
-    Attributes:
-        period: In s.
-        bend_rate: Largest rate of a or b of a ball, in rad/s.
-        travel_rate: Largest speed of the translation, in m/s.
-    """
-
-    period: float = 0.02
-    bend_rate: float = 1.5
-    travel_rate: float = 0.03
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(
-                    f"resection_ik.{name}={value}: expected > 0; the default is "
-                    f"{getattr(ResectionIkParams(), name)}"
-                )
+    period: float = parameter(0.02, "of the postures", "s", least=1e-3, most=0.1)
+    bend_rate: float = parameter(
+        1.5, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+    )
+    travel_rate: float = parameter(
+        0.03, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+    )
 
 
 def universal(posture: Sequence[float]) -> list[float]:
@@ -159,9 +149,8 @@ class ResectionIk(Block):
     ) -> None:
         """Makes the block, starting at a posture (7)."""
         super().__init__()
-        self._params = params or ResectionIkParams()
-        self._params.check()
-        self._snake = (snake or SnakeParams()).check()
+        self._params = check(params or ResectionIkParams())
+        self._snake = check(snake or SnakeParams())
         straight = 3 * self._snake.straight_module + self._snake.tool_offset
         self._target = self.vector_in(
             "target", [0.0, 0.0, straight, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0]

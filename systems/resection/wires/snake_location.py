@@ -9,6 +9,7 @@ from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake import FAR, NEAR, NEAR_ANGLES, POSITIONS
 from systems.common.block import Block
+from systems.common.parameter import check
 from systems.resection.wires.resection_ik import from_universal
 
 
@@ -29,7 +30,7 @@ class SnakeLocation(Block):
     def __init__(self, snake: SnakeParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
-        self._snake = (snake or SnakeParams()).check()
+        self._snake = check(snake or SnakeParams())
         self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
         ticket = {self._state.ticket()}
         self._posture = self.cached("posture", self._calc_posture, ticket)

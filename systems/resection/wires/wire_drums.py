@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from plants.snake.actuation import length_range, wire_lengths
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 
 AXES = 10
 """Nine drums and the translation."""
@@ -17,28 +17,24 @@ AXES = 10
 
 @dataclass
 class WireDrumsParams:
-    """Parameters of `WireDrums`.
+    """Parameters of `WireDrums`."""
 
-    Attributes:
-        period: Of the motors' position control, in s.
-        wire_rate: Largest speed of a wire, in m/s.
-        travel_rate: Largest speed of the translation, in m/s.
-        margin: Stroke beyond what postures need, for pretension, in m.
-    """
-
-    period: float = 0.02
-    wire_rate: float = 0.05
-    travel_rate: float = 0.04
-    margin: float = 1.0e-3
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(
-                    f"wire_drums.{name}={value}: expected > 0; the default is "
-                    f"{getattr(WireDrumsParams(), name)}"
-                )
+    period: float = parameter(
+        0.02, "of the motors' position control", "s", least=1e-3, most=0.1
+    )
+    wire_rate: float = parameter(
+        0.05, "largest speed of a wire", "m/s", least=1e-3, most=1.0
+    )
+    travel_rate: float = parameter(
+        0.04, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+    )
+    margin: float = parameter(
+        1.0e-3,
+        "stroke beyond what postures need, for pretension",
+        "m",
+        above=0.0,
+        most=0.01,
+    )
 
 
 class WireDrums(Block):
@@ -70,9 +66,8 @@ class WireDrums(Block):
     ) -> None:
         """Makes the block, starting at `lengths` (10); straight at s = 0 if None."""
         super().__init__()
-        self._params = params or WireDrumsParams()
-        self._params.check()
-        snake = (snake or SnakeParams()).check()
+        self._params = check(params or WireDrumsParams())
+        snake = check(snake or SnakeParams())
         low, high = length_range(snake)
         margin = self._params.margin
         self._low = np.append(low - margin, snake.travel[0])

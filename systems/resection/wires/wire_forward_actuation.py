@@ -9,6 +9,7 @@ from plants.snake.actuation import Bends, bends_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from systems.common.block import Block
+from systems.common.parameter import check
 from systems.resection.wires.resection_ik import universal
 
 
@@ -47,8 +48,8 @@ class WireForwardActuation(Block):
                 a step's start, and brings the joints there by its end.
         """
         super().__init__()
-        self._snake = (snake or SnakeParams()).check()
-        self._drive = (drive or SnakeDriveParams()).check()
+        self._snake = check(snake or SnakeParams())
+        self._drive = check(drive or SnakeDriveParams())
         self._lead = self._drive.lead + hold
         self._travel_lead = self._drive.travel_lead + hold
         straight = [*wire_lengths(np.zeros(7), self._snake).tolist(), 0.0]

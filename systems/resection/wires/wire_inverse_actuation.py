@@ -1,8 +1,7 @@
 """Wire inverse actuation: the drums' positions for a posture."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,38 +12,33 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.tension import tensions
 from plants.snake.weight import GRAVITY, weight
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 from systems.resection.wires.resection_ik import from_universal, universal
 
 
 @dataclass
 class WireInverseActuationParams:
-    """Parameters of `WireInverseActuation`.
+    """Parameters of `WireInverseActuation`."""
 
-    Attributes:
-        stiffness: Of one wire in N/m: wires are wound shorter by what they
-            stretch. 0 for drums whose servos give way instead.
-        least_tension: Of the pretension in each module, in N.
-        gravity: Acceleration in W in m/s2, (3,), whose sag is made up for; zeros
-            to let the snake sag.
-    """
-
-    stiffness: float = 0.0
-    least_tension: float = 2.0
-    gravity: list[float] = field(default_factory=lambda: list(GRAVITY))
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name in ("stiffness", "least_tension"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(
-                    f"wire_inverse_actuation.{name}={getattr(self, name)}: "
-                    "expected >= 0"
-                )
-        if len(self.gravity) != 3 or not all(map(math.isfinite, self.gravity)):
-            raise ValueError(
-                f"wire_inverse_actuation.gravity={self.gravity}: expected three "
-                f"finite numbers, e.g. {list(GRAVITY)}"
-            )
+    # Wires are wound shorter by what they stretch.
+    stiffness: float = parameter(
+        0.0,
+        "of one wire; 0 for drums whose servos give way instead",
+        "N/m",
+        least=0.0,
+        most=1e6,
+    )
+    least_tension: float = parameter(
+        2.0, "of the pretension in each module", "N", least=0.0, most=50.0
+    )
+    gravity: list[float] = parameter(
+        list(GRAVITY),
+        "in W, whose sag is made up for; zeros to let the snake sag",
+        "m/s2",
+        least=-20.0,
+        most=20.0,
+        shape=(3,),
+    )
 
 
 def wound_lengths(
@@ -87,10 +81,9 @@ class WireInverseActuation(Block):
     ) -> None:
         """Makes the block for a snake and its drive."""
         super().__init__()
-        self._params = params or WireInverseActuationParams()
-        self._params.check()
-        self._snake = (snake or SnakeParams()).check()
-        self._drive = (drive or SnakeDriveParams()).check()
+        self._params = check(params or WireInverseActuationParams())
+        self._snake = check(snake or SnakeParams())
+        self._drive = check(drive or SnakeDriveParams())
         self._posture = self.vector_in("posture", [0.0, 0.3, 0.2, 1.0, 0.4, 2.0, 0.1])
         self.vector_out("drums", 10, self._calc_drums, {self._posture.ticket()})
 

@@ -8,22 +8,16 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.snake import NEAR_ANGLES, POSITIONS
 from plants.snake.tension import tensions
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 
 
 @dataclass
 class WireTensionParams:
-    """Parameters of `WireTension`.
+    """Parameters of `WireTension`."""
 
-    Attributes:
-        least: Tension of the slackest wire of each module, in N.
-    """
-
-    least: float = 1.0
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        if not self.least >= 0.0:
-            raise ValueError(f"wire_tension.least={self.least} N: expected >= 0")
+    least: float = parameter(
+        1.0, "tension of the slackest wire of each module", "N", least=0.0, most=50.0
+    )
 
 
 class WireTension(Block):
@@ -47,9 +41,8 @@ class WireTension(Block):
     ) -> None:
         """Makes the block."""
         super().__init__()
-        self._params = params or WireTensionParams()
-        self._params.check()
-        self._snake = (snake or SnakeParams()).check()
+        self._params = check(params or WireTensionParams())
+        self._snake = check(snake or SnakeParams())
         self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
         self._actuation = self.vector_in("net_actuation", [0.0] * 7)
         self.vector_out(

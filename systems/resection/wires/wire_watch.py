@@ -7,30 +7,22 @@ from typing import Any
 import numpy as np
 
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
 
 
 @dataclass
 class WireWatchParams:
-    """Parameters of `WireWatch`.
+    """Parameters of `WireWatch`."""
 
-    Attributes:
-        period: At which tensions are sampled, in s.
-        least: Tension below which a wire counts as slack, in N.
-        samples: Slack samples in a row that raise the alarm.
-    """
-
-    period: float = 0.02
-    least: float = 0.5
-    samples: int = 2
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        if not self.period > 0.0:
-            raise ValueError(f"wire_watch.period={self.period} s: expected > 0")
-        if not self.least >= 0.0:
-            raise ValueError(f"wire_watch.least={self.least} N: expected >= 0")
-        if self.samples < 1:
-            raise ValueError(f"wire_watch.samples={self.samples}: expected >= 1")
+    period: float = parameter(
+        0.02, "at which tensions are sampled", "s", least=1e-3, most=0.1
+    )
+    least: float = parameter(
+        0.5, "tension below which a wire counts as slack", "N", above=0.0, most=50.0
+    )
+    samples: int = parameter(
+        2, "slack samples in a row that raise the alarm", least=1, most=10
+    )
 
 
 class WireWatch(Block):
@@ -51,8 +43,7 @@ class WireWatch(Block):
     def __init__(self, params: WireWatchParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
-        self._params = params or WireWatchParams()
-        self._params.check()
+        self._params = check(params or WireWatchParams())
         self._tension = self.vector_in("tension", [4.0] * 9)
         self._count = self.DeclareDiscreteState([0.0] * 9)  # slack samples in a row
         self._alarm = self.state_out("alarm", [-1.0, -1.0])

@@ -13,6 +13,7 @@ from diagrams.common.replay import start_meshcat
 from diagrams.common.run import Run, run_scenario, simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.metrics import spans, stops, time_to_target
+from diagrams.gauze.tools import gap
 from diagrams.studies import load_scenario
 from plants.instruments.posed_tools import PosedToolsParams
 from plants.surgeon.recording import save_recording
@@ -63,11 +64,11 @@ def test_static_surgeon_of_figure_7():
     r = paper("gauze_static")
     assert r.metrics["final_tip_error"] <= 0.002
     assert r.metrics["min_tool_clearance"] >= 0.005
-    gap = r.clearance.obstacle
+    clear = gap(r, "obstacle")
     speed = np.linalg.norm(r.navigation.tool.v, axis=1)
     full = r.scenario.go_to_target.max_speed
-    border = int(np.argmax(gap < r.scenario.go_to_target.influence_distance))
-    nearest = int(gap.argmin())
+    border = int(np.argmax(clear < r.scenario.go_to_target.influence_distance))
+    nearest = int(clear.argmin())
     # Straight on at full speed to the field's border ...
     tip = r.robot.tool.tip
     way = np.array(r.scenario.target.points[0]) - tip[0]
@@ -90,7 +91,7 @@ def test_dynamic_surgeon_of_figure_8():
     drift = np.ptp(r.target.shaft.tip, axis=0)
     assert np.linalg.norm(drift) > 0.02
     # Near the obstacle faster than the field's own speed: it follows the obstacle.
-    near = (r.clearance.obstacle < 0.02) & (v_O > 0.01)
+    near = (gap(r, "obstacle") < 0.02) & (v_O > 0.01)
     faster = tip_speed(r, r.planner.v_R) - tip_speed(r, r.planner.v1)
     assert (faster[near] > 0.005).sum() * r.study.log_period > 0.2
     assert r.planner.weights.c3[near].max() > 0.7
@@ -111,7 +112,7 @@ def test_push_aside():
 
 def test_recording_and_its_figures():
     r = run("gauze_recorded")
-    assert Path(r.scenario.recording).name == "obstacle_sweep.csv"
+    assert Path(r.scenario.obstacles[0].recording).name == "obstacle_sweep.csv"
     moved = np.ptp(r.obstacle.shaft.tip, axis=0)
     assert np.linalg.norm(moved) > 0.03
 
@@ -136,7 +137,7 @@ def test_any_recording_is_run_and_its_contact_reported(tmp_path, motion, contact
     r = simulate(scenario)
     assert r.metrics["contact"] is contact
     # The clearance is that between two shafts.
-    fulcrum = tuple(scenario.obstacle.p_WG)
+    fulcrum = tuple(scenario.obstacles[0].p_WG)
     tools, shafts = r.robot.tool, r.obstacle.shaft
     axes = [
         closest_points(tuple(g), tuple(p), fulcrum, tuple(p_O)).distance
@@ -158,7 +159,7 @@ def test_lost_sight_stops_and_goes_on():
             time < stop["start"] + stop["duration"] - 0.02
         )
         assert speed[still].max() == 0.0
-    assert r.clearance.obstacle.min() > 0.005
+    assert gap(r, "obstacle").min() > 0.005
 
 
 def test_same_seed_same_figures():
@@ -177,7 +178,7 @@ def test_known_fulcrums_and_the_printed_form_can_be_chosen():
     r = simulate(scenario)
     assert not r.metrics["reached"]  # as printed the robot is pushed from its goal
     found = r.obstacle.estimate.fulcrum
-    np.testing.assert_allclose(found[5:], [scenario.obstacle.p_WG] * len(found[5:]))
+    np.testing.assert_allclose(found[5:], [scenario.obstacles[0].p_WG] * len(found[5:]))
 
 
 def test_target_out_of_reach_stops_the_robot_until_it_comes_back():
@@ -185,7 +186,7 @@ def test_target_out_of_reach_stops_the_robot_until_it_comes_back():
     scenario.target.times = [0.5, 1.5, 3.0, 4.0]
     near, far = [0.05, 0.03, -0.12], [0.03, 0.03, -0.21]
     scenario.target.points = [near, far, far, near]
-    scenario.obstacle.points = [[0.0, 0.09, -0.1]]  # out of the way
+    scenario.obstacles[0].points = [[0.0, 0.09, -0.1]]  # out of the way
     r = simulate(scenario)
     assert [stop["reason"] for stop in r.metrics["stops"]] == ["target out of reach"]
     assert r.metrics["stops"][0]["duration"] > 1.0

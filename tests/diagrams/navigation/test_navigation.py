@@ -130,7 +130,7 @@ def test_negative_radius_is_refused():
 
 
 def test_a_world_without_obstacles_has_no_clearance():
-    r = run("one_static", "obstacles=[]", "compare=[]")
+    r = run("nav_one_static", "obstacles=[]", "compare=[]")
     assert r.metrics["reached"] and r.metrics["min_clearance"] is None
     assert r.metrics["path_ratio"] == pytest.approx(1.0, abs=0.02)
     assert not r.obstacles.rows.radius.any()

@@ -5,8 +5,9 @@ import pytest
 
 from diagrams.resection.operation import new_session
 from diagrams.resection.scenario import ResectionScenario
+from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.mask_labels import MaskLabels
-from plants.tissue.volume import CAP, CRITICAL, TUMOUR, Access
+from plants.tissue.volume import Access
 from tests.plants.tissue.mask_files import write_mask
 
 

@@ -95,15 +95,23 @@ def test_same_seed_same_result():
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("wires=rubber", "wires='rubber': choose from drums, elastic"),
-        ("period=0.0", r"period=0.0 s: expected > 0"),
-        ("snake.half_pitch=0.0045", r"tan\(max_bend/2\)=0.4142 >= R/\(2d\)=0.3750"),
-        ("snake.max_bend=0.9", r"max_bend=0.9000 rad must lie in \(0, pi/4\]"),
+        ("wires=rubber", "wires='rubber': expected one of drums, elastic"),
+        ("period=0.0", r"period=0.0 s: expected >= 0.001"),
+        ("snake.half_pitch=0.0045", r"tan\(max_bend/2\)=0.4142 < R/\(2d\)=0.3750"),
+        (
+            "snake.max_bend=0.9",
+            "max_bend=0.9 rad: expected >= 0.01 and <= 0.7854",
+        ),
         ("tip.circle.radius=0.05", "stopped by .*nearest reachable position"),
         ("tip.circle.p_WC=[0, 0, 0.3]", "stopped by s_max"),
         ("tip.circle.lean=1.7", "stopped by beta3"),
+        ("snake.tool_radius=1e300", r"snake.tool_radius=1e\+300 m: expected"),
+        ("period=1e-12", "period=1e-12 s: expected"),
+        ("tip.dwell=1e12", "tip.dwell=1e\\+12 s: expected"),
+        ("duration=1e12", "duration=1e\\+12 s: expected"),
+        ("drive.kd=1.0", "drive.kd=1.0 N m s/rad: expected at most 0.1 s"),
         ("elastic.breaks=[{wire: 1, time: 0.5}]", "expected wires='elastic'"),
-        ("drive.kp=-1.0", "kp=-1.0 must be > 0"),
+        ("drive.kp=-1.0", "drive.kp=-1.0 N m/rad: expected >= 0.01"),
     ],
 )
 def test_bad_input_is_refused_before_anything_runs(override, message):

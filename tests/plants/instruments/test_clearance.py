@@ -7,6 +7,7 @@ from scipy.optimize import minimize
 from plants.instruments.clearance import Clearance
 from plants.instruments.instrument import InstrumentParams
 from plants.instruments.posed_tools import PosedToolsParams
+from systems.common.signal import columns
 
 ROBOT, TOOLS = InstrumentParams(), PosedToolsParams()
 
@@ -54,6 +55,19 @@ def test_clearance_is_the_distance_of_the_shafts_surfaces(make_scene, seed):
         other = core(shafts[name][:3], shafts[name][3:], length, radius)
         expected = segment_distance(robot, other) - r - radius
         assert value == pytest.approx(expected, abs=2e-5)
+
+
+def test_columns_are_roles_or_names_where_a_role_is_shared():
+    assert columns(
+        Clearance(object(), {"O": 1, "S": 2, "C": 3}).signals["clearance"]
+    ) == (
+        "obstacle",
+        "target",
+        "camera",
+    )
+    tools = (("near", "obstacle"), ("far", "obstacle"), ("S", "target"))
+    dut = Clearance(object(), {"near": 1, "far": 2, "S": 3}, tools)
+    assert columns(dut.signals["clearance"]) == ("near", "far", "target")
 
 
 def test_missing_geometry_is_refused():

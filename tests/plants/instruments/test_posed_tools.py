@@ -7,14 +7,14 @@ from pydrake.geometry import Role, SceneGraph
 from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from plants.instruments.posed_tools import PosedTools, PosedToolsParams
+from plants.instruments.posed_tools import TOOLS, PosedTools, PosedToolsParams
 
 
-def posed(shafts):
+def posed(shafts, params=None, tools=TOOLS):
     """The tools' poses in W, by frame name."""
     builder = DiagramBuilder()
     scene_graph = builder.AddNamedSystem("scene_graph", SceneGraph())
-    dut = PosedTools(scene_graph)
+    dut = PosedTools(scene_graph, params, tools)
     context = dut.CreateDefaultContext()
     for name, shaft in shafts.items():
         dut.GetInputPort(name).FixValue(context, shaft)
@@ -49,6 +49,15 @@ def test_trocars_ride_on_the_shafts_at_the_fulcrums():
         near = [poses[f"trocar_{n}"].translation() for n in "SOC"]
         distances = np.linalg.norm(np.array(near) - fulcrum, axis=1)
         assert distances.min() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_any_number_of_tools_is_posed():
+    tools = (("near", "obstacle"), ("far", "obstacle"), ("S", "target"))
+    shafts = {name: [0.01 * i, 0, -0.1, 0, 0, -1] for i, (name, _) in enumerate(tools)}
+    dut, poses = posed(shafts, PosedToolsParams(), tools)
+    assert list(dut.shafts) == ["near", "far", "S"]
+    for name, shaft in shafts.items():
+        np.testing.assert_allclose(poses[f"tool_{name}"].translation(), shaft[:3])
 
 
 def test_poses_depend_on_nothing_but_the_shafts():
@@ -86,12 +95,12 @@ def test_only_shafts_have_proximity_geometry(make_scene):
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        (PosedToolsParams(tool_length=2.0), "posed_tools.tool_length=2.0 .* 0.6"),
+        (PosedToolsParams(tool_length=2.0), "posed_tools.tool_length=2.0 m: .*<= 0.6"),
         (PosedToolsParams(view_half_angle=math.nan), "view_half_angle=nan"),
-        (PosedToolsParams(fulcrums=[[0.0, 0.0, 0.0]]), "must be three points"),
+        (PosedToolsParams(fulcrums=[[0.0, 0.0, 0.0]]), "fulcrums=.*one .*of S, O, C"),
         (
             PosedToolsParams(fulcrums=[[0.0, 0.0, math.inf]] * 3),
-            "must be three points",
+            "posed_tools.fulcrums=.* x 3 numbers",
         ),
     ],
 )

@@ -15,7 +15,7 @@ from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
 from plants.snake.tension import length_jacobian
 from plants.snake.wire_path import hanging_points, tangent_points, wires_at
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 
 
 def make_plant(time_step=0.0, elastic=False):

@@ -6,6 +6,7 @@ from plants.snake.kinematics import centreline
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import OK, body_of, check_limits, corners, drive
 from systems.resection.wires.resection_ik import universal
+from tests.ball import ball_session
 
 
 def test_corners_are_the_centreline():
@@ -27,7 +28,7 @@ def test_limits_are_a_cone():
     assert check_limits(body, np.array([0.2, 0, 0, 0, 0, 0, 0.0])) != OK
 
 
-def test_a_way_once_driven_is_open_both_ways(ball_session):
+def test_a_way_once_driven_is_open_both_ways():
     session = ball_session()
     s, b, why = session.volume.space(), session.body, session.why
     home = session.home
@@ -40,7 +41,7 @@ def test_a_way_once_driven_is_open_both_ways(ball_session):
     assert s.used[0] == freed
 
 
-def test_a_way_that_fails_leaves_nothing(ball_session):
+def test_a_way_that_fails_leaves_nothing():
     session = ball_session()
     s, b, why = session.volume.space(), session.body, session.why
     tau = session.volume.tau.copy()

@@ -10,7 +10,7 @@ from plants.snake.kinematics import forward, from_universal
 from plants.snake.parameters import SnakeParams
 from plants.snake.tension import length_jacobian, tensions, torques_against
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 
 
 def random_angles(rng):

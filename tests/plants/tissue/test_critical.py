@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from plants.snake.parameters import SnakeParams
-from plants.tissue import tissue
 from plants.tissue.critical import EXACT, Boxes, cover
+from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.tissue import Tissue
-from plants.tissue.volume import CAP, CRITICAL, TUMOUR, Access, make_volume
+from plants.tissue.volume import Access, make_volume
 from systems.resection.planning.session import Session, load_session
 from tests.plants.tissue.mask_files import TURN
 
@@ -22,7 +22,7 @@ def ball_and_line(spacing=1e-3, radius=13e-3, gap=1e-3, size=40):
     axis = (np.arange(size) - size // 2) * spacing
     x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
     labels = (x**2 + y**2 + z**2 <= radius**2).astype(np.uint8)
-    labels[size // 2 + round((radius + gap) / spacing), :, size // 2] = 2
+    labels[size // 2 + round((radius + gap) / spacing), :, size // 2] = CRITICAL
     X = np.diag([spacing] * 3 + [1.0])
     X[:3, 3] = axis[0]
     return Tissue(labels, X, "line", is_mask=True)
@@ -30,7 +30,7 @@ def ball_and_line(spacing=1e-3, radius=13e-3, gap=1e-3, size=40):
 
 def boxes_of(body, volume):
     """The critical voxels of a mask in the frame of a volume."""
-    index = np.argwhere(body.labels == tissue.CRITICAL)
+    index = np.argwhere(body.labels == CRITICAL)
     return Boxes(index, np.linalg.inv(volume.X_PW) @ body.X_PV)
 
 
@@ -119,12 +119,12 @@ def test_a_vessel_far_above_blocks_the_channel():
     """It lies outside of the operated grid, where the channel comes from."""
     body = ball_and_line(size=100)
     labels = body.labels.copy()
-    labels[:, :, 98] = np.where(np.arange(100) == 50, 2, 0)[:, None]
+    labels[:, :, 98] = np.where(np.arange(100) == 50, CRITICAL, 0)[:, None]
     above = Tissue(labels, body.X_PV, "above", is_mask=True)
     down = Access(direction=[0.0, 0.0, -1.0])
     with pytest.raises(ValueError, match="channel runs through what is critical"):
         make_volume(above, down, 4e-3, 1e-3)
-    labels[:, :, 98] = np.where(np.arange(100) == 56, 2, 0)[:, None]
+    labels[:, :, 98] = np.where(np.arange(100) == 56, CRITICAL, 0)[:, None]
     assert make_volume(above, down, 4e-3, 1e-3).labels.shape[2] < 60  # 0.5 mm beside
 
 

@@ -11,9 +11,9 @@ import SimpleITK as sitk
 
 from plants.tissue import mask, mask_reader
 from plants.tissue.image import MaskError
+from plants.tissue.labels import CRITICAL, TUMOUR
 from plants.tissue.mask import load_mask
 from plants.tissue.mask_labels import MaskLabels
-from plants.tissue.tissue import CRITICAL, TUMOUR
 from systems.common.parameter import ParameterError
 from tests.plants.tissue.mask_files import (
     TURN,

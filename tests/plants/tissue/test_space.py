@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from plants.tissue import space as sp
-from plants.tissue.volume import BRAIN, CHANNEL, TUMOUR, Volume
+from plants.tissue.labels import BRAIN, CHANNEL, TUMOUR
+from plants.tissue.volume import Volume
 
 
 @pytest.fixture

@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 
 from plants.snake.parameters import SnakeParams
+from plants.tissue.labels import CAP, CRITICAL
 from plants.tissue.tissue import (
-    CRITICAL,
     SyntheticTumour,
     Tissue,
     synthetic_tumour,
 )
-from plants.tissue.volume import CAP, Access, make_volume
+from plants.tissue.volume import Access, make_volume
 from systems.resection.planning.access import propose_access
-
-DOWN = Access(direction=[0.0, 0.0, -1.0])
+from tests.ball import DOWN, ball_tissue
 
 
 def test_synthetic_tumours_are_seeded_and_sized():
@@ -53,13 +52,13 @@ def test_spacing_of_zero():
         (Access(direction=[0.0, 0.0, 1.0], clearance=0.0), "clearance=0.0"),
     ],
 )
-def test_bad_access(ball_tissue, access, message):
+def test_bad_access(access, message):
     with pytest.raises(ValueError, match=message):
-        make_volume(ball_tissue, access, 4e-3, 1e-3)
+        make_volume(ball_tissue(), access, 4e-3, 1e-3)
 
 
-def test_channel_and_cap(ball_tissue):
-    volume = make_volume(ball_tissue, DOWN, 4e-3, 0.5e-3)
+def test_channel_and_cap():
+    volume = make_volume(ball_tissue(), DOWN, 4e-3, 0.5e-3)
     x, y, z = volume.points(volume.labels == CAP).T
     assert np.hypot(x, y).max() <= volume.channel
     assert z.max() <= volume.depth
@@ -67,7 +66,7 @@ def test_channel_and_cap(ball_tissue):
     assert volume.depth == pytest.approx(0.015 - np.sqrt(0.015**2 - 0.005**2), abs=1e-3)
 
 
-def test_the_proposed_access_is_the_best_of_those_tried(ball_tissue):
-    proposal = propose_access(ball_tissue, Access(), SnakeParams(), count=1)
+def test_the_proposed_access_is_the_best_of_those_tried():
+    proposal = propose_access(ball_tissue(), Access(), SnakeParams(), count=1)
     assert proposal.fraction > 0.6
     assert len(proposal.tried) == 2

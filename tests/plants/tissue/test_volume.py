@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from plants.tissue.labels import CAP, TUMOUR
 from plants.tissue.tissue import Tissue
-from plants.tissue.volume import CAP, TUMOUR, Access, make_volume
+from plants.tissue.volume import Access, make_volume
+from tests.ball import ball_tissue
 from tests.plants.tissue.mask_files import TURN
 
 
@@ -74,8 +76,8 @@ def test_a_single_slice_stays_as_thick_as_it_is():
     assert (x, y) == pytest.approx((15e-3, 15e-3), abs=1.6e-3)
 
 
-def test_a_synthetic_tumour_has_no_mask(ball_tissue):
-    volume = make_volume(ball_tissue, Access(direction=[0, 0, -1.0]), 4e-3, 1e-3)
+def test_a_synthetic_tumour_has_no_mask():
+    volume = make_volume(ball_tissue(), Access(direction=[0, 0, -1.0]), 4e-3, 1e-3)
     assert volume.mask_volume is None
 
 

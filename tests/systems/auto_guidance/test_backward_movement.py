@@ -76,7 +76,7 @@ def test_block_output_is_the_step_that_its_update_makes():
     dut = BackwardMovement()
     context = dut.CreateDefaultContext()
     dut.GetInputPort("guide").FixValue(context, flat(GUIDE))
-    dut.GetInputPort("obstacle").FixValue(context, flat(OBSTACLE))
+    dut.GetInputPort("obstacles").FixValue(context, flat(OBSTACLE))
     expected = backward_movement(
         BackwardMovementParams(), (0, 0, 0), DT, GUIDE, OBSTACLE
     )

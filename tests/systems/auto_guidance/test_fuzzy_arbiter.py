@@ -252,7 +252,7 @@ def fixed(dut):
         "v3": (0.0, -0.01, 0.0),
         "guide": flat(GUIDE),
         "robot_tool": flat(ROBOT),
-        "obstacle": flat(OBSTACLE),
+        "obstacles": flat(OBSTACLE),
         "target": flat(TARGET),
     }.items():
         dut.GetInputPort(name).FixValue(context, value)

@@ -243,7 +243,7 @@ def test_block_output_is_the_step_that_its_update_makes():
     dut = GoToTarget()
     context = dut.CreateDefaultContext()
     for port, value in zip(
-        ("robot_tool", "obstacle", "target"),
+        ("robot_tool", "obstacles", "target"),
         (ROBOT, OBSTACLE, TARGET),
         strict=True,
     ):

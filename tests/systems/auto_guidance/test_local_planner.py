@@ -214,7 +214,7 @@ def test_the_drake_blocks_give_the_loops_velocities(kind):
             Replay(signal, lambda t, i=i: inputs[min(round(t / DT), last)][i]),
         ).get_output_port()
         for i, (name, signal) in enumerate(
-            (("robot_tool", RobotTool), ("obstacle", Estimate), ("target", Estimate))
+            (("robot_tool", RobotTool), ("obstacles", Estimate), ("target", Estimate))
         )
     }
     ports = add_planner(builder, ports)

@@ -195,7 +195,7 @@ def test_block():
     for name, value in (
         ("v1", (0.05, 0, 0)),
         ("guide", flat(g)),
-        ("obstacle", flat(o)),
+        ("obstacles", flat(o)),
     ):
         dut.GetInputPort(name).FixValue(context, value)
     expected = velocity_correction(PARAMS, (0.05, 0, 0), g, o)

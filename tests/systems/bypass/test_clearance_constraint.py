@@ -7,7 +7,6 @@ from diagrams.gauze.kinematic_loop import estimate
 from diagrams.gauze.kinematic_planners import NO_CONE
 from systems.bypass import clearance_constraint, obstacle_tools, workspace
 from systems.bypass.clearance_constraint import (
-    TOOLS,
     ClearanceConstraint,
     ClearanceConstraintParams,
     constrain,
@@ -19,12 +18,12 @@ from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
 from systems.common.reach_limits import ReachLimits
 from systems.common.signal import example, flat
-from systems.common.signals import Estimate
+from systems.common.signals import FREE, Estimate, Guide, RobotTool
 
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
 ROOM = workspace.constants(ReachLimits(max_tilt=3.1), WorkspaceParams(floor=-0.5))[0]
-NOT_DODGING = np.zeros(TOOLS)
+NOT_DODGING = np.zeros(3)
 
 
 def tool(a, tip, v=(0.0, 0.0, 0.0)) -> ObstacleTool:
@@ -123,26 +122,92 @@ def test_the_borders_of_the_workspace_hold():
     assert angle < 0.5005
 
 
+def test_it_keeps_clear_of_three_obstacles():
+    """R is sent at one after the other, and then between two of them."""
+    obstacles = [
+        estimate((0.02, 0.02, -0.13), (0.09, 0.09, 0.0)),
+        estimate((-0.02, 0.02, -0.13), (-0.09, 0.09, 0.0)),
+        estimate((0.0, -0.025, -0.13), (0.0, -0.12, 0.0)),
+    ]
+    far = estimate((0.3, 0.0, -0.1), (0.3, 0.0, 0.0))
+    dut = ClearanceConstraint(obstacles=("right", "left", "front"))
+    context = dut.CreateDefaultContext()
+    for name, signal in {
+        "guide": example(Guide)._replace(s=1.0),
+        "obstacles": tuple(obstacles),
+        "target": far,
+        "camera": far,
+        "view_cone": NO_CONE,
+        "permission": FREE,
+    }.items():
+        dut.GetInputPort(name).FixValue(context, flat(signal))
+    p, near = (0.0, 0.0, -0.12), np.full(3, np.inf)
+    for goal in [*(tool.p for tool in obstacles), (0.0, 0.05, -0.12)]:
+        for _ in range(120):
+            wanted = geometry.scaled(2.0, geometry.sub(goal, p))
+            robot = RobotTool(G, p)
+            dut.GetInputPort("robot_tool").FixValue(context, flat(robot))
+            dut.GetInputPort("v_R").FixValue(context, wanted)
+            v = dut.GetOutputPort("v_safe").Eval(context)
+            p = moved(p, tuple(v), 1.0 / 60.0)
+            near = np.minimum(
+                near,
+                [
+                    geometry.closest_points(G, p, o.fulcrum, o.p).distance
+                    for o in obstacles
+                ],
+            )
+    # It was near to each, and never nearer than D_safe.
+    assert (near < 0.0075).all() and (near > 0.007 - 1e-4).all()
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_one_of_three_that_is_lost_cannot_be_judged(place):
+    dut = ClearanceConstraint(obstacles=("right", "left", "front"))
+    context = dut.CreateDefaultContext()
+    for index in range(dut.num_input_ports()):
+        port = dut.get_input_port(index)
+        port.FixValue(context, dut.AllocateInputVector(port).value())
+    assert dut.GetOutputPort("status").Eval(context)[2] == 1.0
+    for bad in ({"known": 0.0}, {"p": (np.nan, 0.0, 0.0)}):
+        obstacles = [example(Estimate)] * 3
+        obstacles[place] = obstacles[place]._replace(**bad)
+        dut.GetInputPort("obstacles").FixValue(context, flat(tuple(obstacles)))
+        v_R = dut.GetInputPort("v_R").Eval(context)
+        np.testing.assert_array_equal(dut.GetOutputPort("v_safe").Eval(context), v_R)
+        assert not np.any(dut.GetOutputPort("status").Eval(context))
+
+
 def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
     record = obstacle_tools.constants(Margins())[0]
     o = estimate((0.0, 0.05, -0.1), (0.0, 0.1, 0.0))
     s = estimate((0.05, 0.0, -0.1), (0.1, 0.0, 0.0))
     c = estimate((0.0, -0.05, -0.05), (0.0, -0.1, 0.0))
-    sure = [*map(read_tool, obstacle_tools.obstacle_tools(record, G, o, s, c))]
+
+    def around(*obstacles):
+        estimates = np.array([*map(flat, obstacles)])
+        tools = obstacle_tools.obstacle_tools(record, G, estimates, s, c)
+        return [*map(read_tool, tools)]
+
+    sure = around(o)
     assert len(sure) == 3
     assert sure[0].safe == Margins().safe_distance
     assert sure[2].safe == Margins().camera_distance
     o = o._replace(sigma_p=3e-4, sigma_v=0.01)
-    unsure = [*map(read_tool, obstacle_tools.obstacle_tools(record, G, o, s, c))]
+    unsure = around(o)
     extra = 3.0 * np.hypot(3e-4, 0.03 * 0.01)
     assert unsure[0].safe - sure[0].safe == pytest.approx(extra)
+    # Every obstacle has a row of its own, before S and the endoscope.
+    three = around(o, s, c)
+    assert [tool.tip for tool in three[:3]] == [o.p, s.p, c.p]
+    assert three[3:] == sure[1:]
     # The final pose keeps the distance that is planned with from what is left of S.
     rho = pose_distance(sure[1], G, (0.05, 0.0, -0.1))
     assert rho == pytest.approx(Margins().plan_distance + 1e-3, abs=1e-4)
 
 
 def test_bad_parameters_are_named():
-    with pytest.raises(ValueError, match=r"rate=-1.0 1/s: expected > 0 and <= 60"):
+    with pytest.raises(ValueError, match=r"rate=-1.0 1/s: expected >= 0.1 and <= 60"):
         ClearanceConstraint(ClearanceConstraintParams(rate=-1.0))
     with pytest.raises(ValueError, match=r"rate=60.0 1/s: expected at most .* = 30"):
         ClearanceConstraint(ClearanceConstraintParams(rate=60.0))
@@ -159,7 +224,7 @@ def test_the_block_lets_pass_what_it_cannot_judge():
         port = dut.get_input_port(index)
         port.FixValue(context, dut.AllocateInputVector(port).value())
     lost = example(Estimate)._replace(known=0.0)
-    dut.GetInputPort("obstacle").FixValue(context, flat(lost))
+    dut.GetInputPort("obstacles").FixValue(context, flat(lost))
     wanted = [0.01, 0.02, 0.03]
     dut.GetInputPort("v_R").FixValue(context, wanted)
     np.testing.assert_allclose(dut.GetOutputPort("v_safe").Eval(context), wanted)

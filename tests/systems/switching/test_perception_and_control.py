@@ -7,6 +7,7 @@ import pytest
 
 from plants.crowd.signals import Obstacle
 from plants.turtlebot.turtlebot import RobotState
+from systems.common.compiled import packed
 from systems.common.signal import example, flat
 from systems.switching.classical_planner import (
     ClassicalParams,
@@ -20,11 +21,26 @@ from systems.switching.switching_planner import SwitchingPlanner
 from systems.switching.unicycle_control import (
     UnicycleControl,
     UnicycleControlParams,
-    heading_law,
+    constants,
 )
+from systems.switching.unicycle_control import heading_law as compiled_law
+from tests.loosely import loosely
 
 ROBOT = RobotState(0.0, 0.0, 0.0, 0.0, 0.0)
 QUIET = Noise(0.0, 0.0, 0.0, 0.0)
+
+law = loosely(compiled_law, constants)
+
+
+def heading_law(params, theta, vx, vy, retreat=False):
+    """Without a retreat if nothing is said."""
+    return law(params, theta, vx, vy, retreat)
+
+
+def seen_of(params, obstacles, noise):
+    """What is seen, as tuples."""
+    (table,) = perceive(packed(params)[0], ROBOT, np.array(obstacles), np.array(noise))
+    return [Seen(*row) for row in table.tolist()]
 
 
 def test_perception_sees_within_its_disc_and_adds_noise():
@@ -35,11 +51,11 @@ def test_perception_sees_within_its_disc_and_adds_noise():
         Obstacle(1.0, 1.0, 0.0, 0.0, 0.0),
     ]
     noise = [Noise(1.0, -1.0, 2.0, 0.0), QUIET, QUIET]
-    near, far, nothing = perceive(params, ROBOT, obstacles, noise)
+    near, far, nothing = seen_of(params, obstacles, noise)
     assert near == pytest.approx(Seen(0.0, 2.02, -0.02, 0.3, 0.2, 0.0))
     assert far.track == -1.0 and nothing.track == -1.0
     # What is not known in numbers is not overlooked.
-    (lost,) = perceive(params, ROBOT, [Obstacle(nan, 0.0, 0.3, 0.0, 0.0)], [QUIET])
+    (lost,) = seen_of(params, [Obstacle(nan, 0.0, 0.3, 0.0, 0.0)], [QUIET])
     assert lost.track == 0.0 and np.isnan(lost.x)
 
 

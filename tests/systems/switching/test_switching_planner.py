@@ -2,6 +2,8 @@
 
 from math import dist, hypot, inf, nan
 import statistics
+import subprocess
+import sys
 from time import perf_counter
 
 import numpy as np
@@ -112,6 +114,19 @@ def test_a_faster_obstacle_is_told():
 def test_within_a_safety_circle_it_leads_out():
     result = step([Seen(0.0, 0.4, 0.0, 0.2, 0.0, 0.0)])
     assert result.v_x < 0.01
+
+
+def test_the_rules_need_no_drake():
+    code = (
+        "import sys, systems.switching.switching_rules; "
+        "sys.exit(any(name.startswith('pydrake') for name in sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_plain_tuples_will_do():
+    crosser = (0.0, 2.0, -2.0, 0.3, 0.0, 0.45)
+    assert step([crosser]) == step([Seen(*crosser)])
 
 
 def test_numbers_that_are_none_are_refused():

@@ -11,10 +11,11 @@ from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner, PlannerParams
 from systems.resection.planning.reach import find_reach
 from systems.resection.wires.resection_ik import from_universal
+from tests.ball import ball_session
 
 
 @pytest.fixture(scope="module")
-def planned(ball_session):
+def planned():
     session = ball_session()
     reach = find_reach(session)
     Planner(session, reach.mask, PlannerParams()).run()
@@ -60,13 +61,13 @@ def test_nothing_stands_out_between_the_checks(planned):
         assert hits == 0, f"on the way to posture {index + 1}"
 
 
-def test_same_seed_same_plan(ball_session, planned):
+def test_same_seed_same_plan(planned):
     _, reach = planned
     again = ball_session()
     assert find_reach(again).fraction == reach.fraction
 
 
-def test_map_says_where(planned, ball_session):
+def test_map_says_where(planned):
     session = ball_session()
     Planner(session, session.volume.allowed > 0).enter()
     tau = session.volume.tau.copy()

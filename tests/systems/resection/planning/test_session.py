@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from plants.snake.parameters import SnakeParams
+from plants.tissue.labels import TUMOUR
 from plants.tissue.space import SOLID
-from plants.tissue.volume import TUMOUR
 from systems.common.archive import before
 from systems.resection.planning.entry_law import (
     least_clearance,
@@ -19,6 +19,7 @@ from systems.resection.planning.procedure import (
     save_procedures,
 )
 from systems.resection.planning.session import load_session
+from tests.ball import ball_session
 
 ENTRY = Procedure("entry", length=0.016, radius=0.005, pitch=1e-3, name="entry")
 
@@ -32,7 +33,7 @@ def test_entry_law_has_the_paper_robot_numbers():
     assert least_clearance(SnakeParams()) == 0.0
 
 
-def test_check_changes_nothing_and_commit_does(ball_session):
+def test_check_changes_nothing_and_commit_does():
     session = ball_session()
     tau = session.volume.tau.copy()
     answer = session.check(ENTRY)
@@ -48,7 +49,7 @@ def test_check_changes_nothing_and_commit_does(ball_session):
         session.undo()
 
 
-def test_arrival_times_replay_the_plan(ball_session):
+def test_arrival_times_replay_the_plan():
     """Stamping the route's postures in their order frees just what was planned."""
     session = ball_session()
     assert session.commit(ENTRY).feasible
@@ -80,7 +81,7 @@ def test_arrival_times_replay_the_plan(ball_session):
         (Procedure("entry", tool=Tool(0.0025, 0.004)), "jam"),
     ],
 )
-def test_refusals_name_their_reason(ball_session, procedure, reason):
+def test_refusals_name_their_reason(procedure, reason):
     session = ball_session()
     answer = session.check(procedure)
     assert not answer.feasible
@@ -90,7 +91,7 @@ def test_refusals_name_their_reason(ball_session, procedure, reason):
     assert session.steps == [] and session.fraction == 0.0
 
 
-def test_a_session_survives_being_killed(ball_session, tmp_path):
+def test_a_session_survives_being_killed(tmp_path):
     file = tmp_path / "a.session"
     session = ball_session()
     session.file = file
@@ -105,7 +106,7 @@ def test_a_session_survives_being_killed(ball_session, tmp_path):
     assert [step.name for step in load_session(file).steps] == ["entry"]
 
 
-def test_a_damaged_file_is_refused_and_the_one_before_offered(ball_session, tmp_path):
+def test_a_damaged_file_is_refused_and_the_one_before_offered(tmp_path):
     file = tmp_path / "a.session"
     session = ball_session()
     session.save(file)
@@ -137,14 +138,17 @@ def test_procedures_are_saved_and_loaded(tmp_path):
     ("procedure", "message"),
     [
         (Procedure("entri"), "kind='entri'"),
-        (Procedure("elementary"), "position=None, expected three"),
+        (Procedure("elementary"), "position=None m: expected three"),
         (Procedure("entry", position=[0, 0, 0]), "the channel's"),
-        (Procedure("elementary", [0, 0, 0], [0, 0, 0]), "no direction"),
-        (Procedure("entry", radius=0.003), "less than the tool's own"),
+        (
+            Procedure("elementary", [0, 0, 0], [0, 0, 0]),
+            "expected a direction",
+        ),
+        (Procedure("entry", radius=0.003), "the tool's own"),
         (Procedure("entry", length=-1.0), "length=-1.0"),
         (Procedure("entry", pitch=0.0), "pitch=0.0"),
     ],
 )
-def test_bad_procedures(ball_session, procedure, message):
+def test_bad_procedures(procedure, message):
     with pytest.raises(ValueError, match=message):
         ball_session().check(procedure)

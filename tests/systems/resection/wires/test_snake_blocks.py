@@ -13,6 +13,7 @@ from plants.snake.kinematics import forward, frames, to_universal
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake import FAR, NEAR, POSITIONS
 from plants.snake.weight import weight
+from systems.common.parameter import check
 from systems.resection.wires.resection_ik import (
     HOLD,
     Motion,
@@ -40,7 +41,7 @@ from systems.resection.wires.wire_inverse_actuation import (
 from systems.resection.wires.wire_tension import WireTension, WireTensionParams
 from systems.resection.wires.wire_watch import WireWatch, WireWatchParams
 
-SNAKE = SnakeParams().check()
+SNAKE = SnakeParams()
 POSTURE = [0.01, 0.4, 0.3, -1.2, 0.5, 2.5, 0.7]
 STRAIGHT = [*wire_lengths(np.zeros(7), SNAKE), 0.0]
 
@@ -296,21 +297,27 @@ def test_reference_poses_take_turns():
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        (ResectionIkParams(bend_rate=0.0), "resection_ik.bend_rate=0.0: expected > 0"),
+        (
+            ResectionIkParams(bend_rate=0.0),
+            "resection_ik.bend_rate=0.0 rad/s: expected",
+        ),
         (WireDrumsParams(wire_rate=-1.0), "wire_drums.wire_rate=-1.0"),
-        (WireInverseActuationParams(stiffness=-1.0), "stiffness=-1.0: expected >= 0"),
+        (
+            WireInverseActuationParams(stiffness=-1.0),
+            "stiffness=-1.0 N/m: expected",
+        ),
         (WireTensionParams(least=-1.0), "wire_tension.least=-1.0 N: expected >= 0"),
         (WireWatchParams(samples=0), "wire_watch.samples=0: expected >= 1"),
-        (WireWatchParams(period=0.0), "wire_watch.period=0.0 s: expected > 0"),
+        (WireWatchParams(period=0.0), "wire_watch.period=0.0 s: expected >= 0.001"),
         (
             ElasticWiresParams(breaks=[WireBreak(9)]),
-            "wire=9, expected 0 to 8; nearest 8",
+            r"elastic_wires.breaks\[0\].wire=9: expected >= 0 and <= 8",
         ),
         (
             ElasticWiresParams(breaks=[WireBreak(1, -1.0)]),
-            r"time=-1.0 s, expected >= 0",
+            r"breaks\[0\].time=-1.0 s: expected >= 0",
         ),
-        (TipReferenceParams(dwell=0.0), "tip_reference.dwell=0.0: expected > 0"),
+        (TipReferenceParams(dwell=0.0), "tip_reference.dwell=0.0 s: expected >= 0.1"),
         (TipReferenceParams(lead=-1.0), "tip_reference.lead=-1.0 s"),
         (
             TipReferenceParams(poses=[ToolPose(n_WT=[0.0, 0.0, 0.0])]),
@@ -318,10 +325,10 @@ def test_reference_poses_take_turns():
         ),
         (
             TipReferenceParams(poses=[ToolPose(p_WT=[0.0])]),
-            r"poses\[0\].p_WT=.*three finite numbers",
+            r"poses\[0\].p_WT=.*expected 3 numbers",
         ),
     ],
 )
 def test_bad_parameters_are_refused(params, message):
     with pytest.raises(ValueError, match=message):
-        params.check()
+        check(params)
