@@ -6,6 +6,7 @@ to the mask's own voxels, which are boxes at any angle to the grid.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 import math
 from typing import Any
 
@@ -33,10 +34,10 @@ class Boxes:
     index: NDArray[np.int64]
     X_WV: Array
 
-    @property
+    @cached_property
     def centres(self) -> Array:
         """In W, (n, 3)."""
-        return self.index @ self.X_WV[:3, :3].T + self.X_WV[:3, 3]
+        return self.index.astype(float) @ self.X_WV[:3, :3].T + self.X_WV[:3, 3]
 
     @property
     def halves(self) -> Array:
