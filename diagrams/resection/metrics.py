@@ -36,6 +36,7 @@ def measure(run: Any) -> dict[str, Any]:
     cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
     return {
         "tumour_volume": volume,
+        "mask_volume": session.volume.mask_volume,
         "cap_volume": cap,
         "reachable_fraction": reach.fraction,
         "planned_fraction": session.fraction,

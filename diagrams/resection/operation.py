@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
+import sys
 from time import perf_counter
 from typing import Any
 
@@ -11,8 +12,9 @@ from diagrams.common.progress import Progress
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.execution import Execution, load_execution
+from plants.tissue.mask import load_mask
 from plants.tissue.space import NEIGHBOUR
-from plants.tissue.tissue import SyntheticTumour, Tissue, load_mask, synthetic_tumour
+from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
 from plants.tissue.volume import Access, make_volume
 from systems.common.archive import beside
 from systems.resection.planning.access import propose_access
@@ -49,10 +51,7 @@ class Operation(Case):
 def tissue_of(scenario: ResectionScenario) -> Tissue:
     """The tissue before the operation."""
     if scenario.mask:
-        labels = scenario.labels
-        return load_mask(
-            scenario.mask, labels.tumour, labels.critical, labels.component
-        )
+        return load_mask(scenario.mask, scenario.labels)
     return synthetic_tumour(scenario.tumour)
 
 
@@ -70,6 +69,8 @@ def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
         # A ball whose voxels keep a distance may stand out of them by half a diagonal.
         scenario.margin + scenario.tracking + NEIGHBOUR * scenario.spacing,
     )
+    for note in [*tissue.notes, *volume.notes]:
+        print(f"trocar: {tissue.name}: {note}", file=sys.stderr)
     session = Session(volume, scenario.snake, scenario.clearance, scenario.accuracy)
     return session, tissue.name
 

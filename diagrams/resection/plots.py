@@ -180,10 +180,11 @@ def _gains(axes: Any, session: Any) -> None:
 
 
 def _figures(m: dict[str, Any]) -> str:
-    critical = m["min_critical_distance"]
+    critical, mask = m["min_critical_distance"], m["mask_volume"]
     rows = [
         f"tumour {1e6 * m['tumour_volume']:.2f} cm³ (without the channel's cap of "
-        f"{1e6 * m['cap_volume']:.2f} cm³)",
+        f"{1e6 * m['cap_volume']:.2f} cm³)"
+        + (f", in the mask {1e6 * mask:.2f} cm³" if mask else ""),
         f"reachable {100 * m['reachable_fraction']:.1f} %, planned "
         f"{100 * m['planned_fraction']:.1f} %, resected "
         f"{100 * m['resected_fraction']:.1f} % of the tumour",

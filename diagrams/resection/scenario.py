@@ -1,11 +1,12 @@
 """The scenario of a resection: every block's and part's parameters."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from diagrams.common.scenario import Scenario, ScenarioError
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
+from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.tissue import SyntheticTumour
 from plants.tissue.tissue_carver import TissueCarverParams
 from plants.tissue.volume import Access
@@ -18,22 +19,6 @@ from systems.resection.wires.wire_drums import WireDrumsParams
 from systems.resection.wires.wire_inverse_actuation import WireInverseActuationParams
 from systems.resection.wires.wire_tension import WireTensionParams
 from systems.resection.wires.wire_watch import WireWatchParams
-
-
-@dataclass
-class MaskLabels:
-    """Which labels of a mask mean what.
-
-    Attributes:
-        tumour: Tumour; all but 0 and the critical ones if empty.
-        critical: What must not be touched.
-        component: Which connected part: 1 for the largest, ...; 0 if there must be
-            one alone.
-    """
-
-    tumour: list[int] = field(default_factory=list)
-    critical: list[int] = field(default_factory=list)
-    component: int = 0
 
 
 @dataclass

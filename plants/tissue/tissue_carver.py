@@ -13,7 +13,7 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.signals import REST, Posture
 from plants.snake.snake_body import CULPRIT, OK, Body, between, body_of, check_body
 from plants.tissue.execution import Execution
-from plants.tissue.labels import CHANNEL, CRITICAL, TUMOUR
+from plants.tissue.labels import CHANNEL, TUMOUR
 from plants.tissue.space import SOLID, Space, in_voxels, stamp
 from plants.tissue.volume import Volume
 from systems.common.block import Block
@@ -166,9 +166,7 @@ class Carving:
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
         self.body = body_of(params)
-        critical = (volume.labels == CRITICAL).any()
-        distance = volume.distance_to_critical() if critical else np.empty(0)
-        self.critical: NDArray[np.float64] = distance.reshape(-1)
+        self.critical: NDArray[np.float32] = volume.to_critical.reshape(-1)
         self.latest = self.done.index
         self.space: Space = self.volume.space()
 

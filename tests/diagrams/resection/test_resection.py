@@ -36,6 +36,7 @@ def test_paper(paper):
     m = run.metrics
     assert not run.error
     assert m["procedures"] == 3 and m["refusals"] == []
+    assert m["mask_volume"] is None  # synthetic
     assert 0.2 < m["resected_fraction"] < 0.3  # rigid procedures: low, as it is
     assert m["body_collisions"] == 0 and m["healthy_removed"] == 0.0
     assert m["max_tool_error"] < 0.1e-3
