@@ -9,12 +9,15 @@ LONG = {"resect_auto_small", "resect_paper", "resect_refused", "snake_wire_break
 """Rows that no other test needs."""
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=[pytest.mark.study] if n in LONG else []) for n in GOLDEN],
-)
-def test_figures_are_golden(name):
-    assert differences(GOLDEN[name], figures(name), name) == []
+def marks(row):
+    """A row runs where the tests of its system do, which have run it already."""
+    group = pytest.mark.xdist_group(GOLDEN[row]["system"])
+    return [group, pytest.mark.study] if row in LONG else [group]
+
+
+@pytest.mark.parametrize("row", [pytest.param(r, marks=marks(r)) for r in GOLDEN])
+def test_figures_are_golden(row):
+    assert differences(GOLDEN[row], figures(row), row) == []
 
 
 def test_a_difference_is_told():

@@ -162,6 +162,15 @@ def test_lost_sight_stops_and_goes_on():
     assert gap(r, "obstacle").min() > 0.005
 
 
+def test_gauze_on_a_patient_who_breathes():
+    figures = run("gauze_breathing").metrics
+    assert figures["reached"] and not figures["contact"]
+    assert figures["min_tool_clearance"] >= 0.004
+    assert figures["rms_lateral_force"] <= 0.3
+    assert figures["final_tip_error"] <= 2e-3
+    assert [stop["reason"] for stop in figures["stops"]] == ["probing the wall"]
+
+
 def test_same_seed_same_figures():
     again = simulate(load_scenario("gauze_lost_sight"))
     first = run("gauze_lost_sight")

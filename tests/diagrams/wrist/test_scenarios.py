@@ -78,16 +78,6 @@ def test_a_lost_sensor_stops_the_task_until_it_is_back():
     assert np.ptp(tip[t > 8.5], axis=0).max() > 5e-3
 
 
-def test_gauze_on_a_patient_who_breathes():
-    result = run("gauze_breathing")
-    figures = result.metrics
-    assert figures["reached"] and not figures["contact"]
-    assert figures["min_tool_clearance"] >= 0.004
-    assert figures["rms_lateral_force"] <= 0.3
-    assert figures["final_tip_error"] <= 2e-3
-    assert [stop["reason"] for stop in figures["stops"]] == ["probing the wall"]
-
-
 def test_same_seed_same_figures():
     one, two = (
         simulate(Case(load_scenario("pwe_breathing", duration=1.0))) for _ in range(2)
