@@ -13,6 +13,8 @@ import yaml
 from diagrams.common.scenario import ScenarioError, nearest
 
 BOOL = "tag:yaml.org,2002:bool"
+NAMED = "tools"
+"""The list whose items are called by their names."""
 SWITCHES = {"yes": True, "on": True, "no": False, "off": False}
 """Texts that are true or false where that is wanted, and only there."""
 
@@ -78,7 +80,7 @@ def read_tree(path: Path) -> dict[str, Any]:
 
 
 def apply_override(tree: dict[str, Any], text: str) -> str:
-    """Puts `KEY.SUB=VALUE` into the tree; the value is read as YAML.
+    """Puts `KEY.SUB=VALUE` into the tree; the value is read as YAML. Tools are added.
 
     Returns:
         The first part of the key.
@@ -86,18 +88,20 @@ def apply_override(tree: dict[str, Any], text: str) -> str:
     Raises:
         ScenarioError: If the text has no such form.
     """
-    key, equals, value = text.partition("=")
+    key, equals, told = text.partition("=")
     parts = key.strip().split(".")
     if not equals or not all(parts):
         raise ScenarioError(f"--set {text!r}: expected KEY.SUB=VALUE")
-    parsed = read_yaml(f"value: {value}", f"--set {text!r}: {value!r} is no value")
+    parsed = read_yaml(f"value: {told}", f"--set {text!r}: {told!r} is no value")
     node = tree
     for part in parts[:-1]:
         child = node.setdefault(part, {})
         if not isinstance(child, dict):
             raise ScenarioError(f"--set {text!r}: {part!r} has no keys below it")
         node = child
-    node[parts[-1]] = parsed["value"]
+    value, before = parsed["value"], node.get(parts[-1])
+    both = parts == [NAMED] and isinstance(value, list) and isinstance(before, list)
+    node[parts[-1]] = before + value if both else value
     return parts[0]
 
 
@@ -105,7 +109,7 @@ def require(tree: dict[str, Any], key: str, path: Path) -> None:
     """Raises a ScenarioError unless the dotted key stands in the tree."""
     node: Any = tree
     for part in key.split("."):
-        named = {tool["name"]: tool for tool in tree.get("tools", ())}
+        named = {tool["name"]: tool for tool in tree.get(NAMED, ())}
         if part not in node and node is tree and part in named:
             node = named[part]
         elif isinstance(node, dict) and part in node:
@@ -174,7 +178,7 @@ def fit(schema: Any, value: Any, path: str = "") -> Any:
 
 def place(path: str, index: int, item: Any) -> str:
     """The key of a list's item; a tool is called by its name alone."""
-    named = path == "tools" and isinstance(item, dict) and item.get("name")
+    named = path == NAMED and isinstance(item, dict) and item.get("name")
     return str(named) if named else f"{path}[{index}]"
 
 

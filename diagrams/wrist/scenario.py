@@ -35,12 +35,12 @@ class WristScenario(Scenario, WristSettings):
     abdomen: AbdomenParams = part(AbdomenParams)
 
 
-UNLIMITED = 1e3
-"""Force limit in N of the comparisons that cannot relax the wall."""
+UNLIMITED = 50.0
+"""Force limit in N of the comparisons that cannot relax the wall: the highest."""
 
 
 def companions(scenario: WristScenario) -> dict[str, WristScenario]:
-    """The scenario in the other modes that it names, without a force limit.
+    """The scenario in the other modes that it names, with the highest force limit.
 
     A wrist that cannot relax the wall would stand still for ever.
     """

@@ -199,7 +199,7 @@ class StepBlock(Block):
         """The step as a function of the context, and the tickets of what it reads."""
         run = wired(step, len(constants), states, list(inputs.values()), gives, timed)
         ports = {name: self.signal_in(name, inputs[name]) for name in inputs}
-        reads = [
+        reads: list[Callable[[Any], Any]] = [
             *(_state_reader(group) for group in range(len(states))),
             *([methodcaller("get_time")] if timed else []),
             *(_port_reader(ports[name], defaults.get(name)) for name in inputs),

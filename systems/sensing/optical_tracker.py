@@ -15,7 +15,7 @@ from pydrake.common import RandomDistribution
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, cross, sub, unit
-from systems.common.parameter import ParameterError, Rules, check, parameter
+from systems.common.parameter import ParameterError, Rules, check, parameter, part
 from systems.common.signal import (
     Field,
     Many,
@@ -28,7 +28,7 @@ from systems.common.signal import (
 )
 from systems.common.signals import Shaft, TrackedShaft
 
-TOOLS = ("S", "O")
+TOOLS = ("target", "obstacle")
 NEVER = -1.0  # s, the frame time before the first frame
 
 
@@ -107,9 +107,18 @@ class OpticalTrackerParams:
     period: float = parameter(1 / 60, "between frames", "s", above=0, most=1)
     # 14.2 ms were measured on a Polaris Vega.
     latency: float = parameter(0.0142, "until it is delivered", "s", least=0, most=1)
-    body: MarkerBody = parameter(MarkerBody, "the markers on each tool")
+    body: MarkerBody = part(MarkerBody)
     losses: list[SightLoss] = parameter(
         [], "when the line of sight is blocked", shape=(-1,)
+    )
+
+
+def constants(body: MarkerBody) -> np.ndarray:
+    """The markers as `disturb` takes them."""
+    return packed(
+        lever=body.lever,
+        sigma_position=body.sigma_position(),
+        sigma_direction=body.sigma_direction(),
     )
 
 
@@ -118,8 +127,7 @@ def disturb(params: Any, shaft: Shaft, noise: MarkerNoise) -> Shaft:
     """A shaft as its markers show it.
 
     Args:
-        params: A record with the markers' `lever` in m, `sigma_position` of their
-            mean along each axis in m, and `sigma_direction` about each in rad.
+        params: A record of `constants`.
         shaft: The true one.
         noise: What errs.
     """
@@ -142,7 +150,7 @@ def _expose(
     """The delay line with a new frame at its end, and without its oldest.
 
     Args:
-        record: Of `disturb`.
+        record: Of `constants`.
         losses: Records of each loss of sight: start and end in s, which tools (n).
         line: Of each frame, of each tool a `TrackedShaft`, the oldest frame first.
         time: Of exposure, in s.
@@ -179,14 +187,14 @@ class OpticalTracker(Block):
     invalid. Noise is white; a real tracker's has a slow part as well, which no filter
     removes and which is left out here.
 
-    Ports ``S`` and ``O``, or of whatever names the tools have, accept the tools' true
-    `Shaft`.
+    Ports ``target`` and ``obstacle``, or of whatever names the tools have, accept the
+    tools' true `Shaft`.
     Port ``noise`` accepts the `MarkerNoise` of one tool after the other, renewed every
     period. It is declared as Drake's Gaussian random input:
     `AddRandomInputs(params.period, builder)`, or a `RandomSource` of that period,
     feeds it, and `SetRandomContext` seeds it; zeros give a tracker without noise.
-    Ports ``S_measured`` and ``O_measured``, likewise, emit the tools' last delivered
-    frame, a `TrackedShaft`.
+    Ports ``target_measured`` and ``obstacle_measured``, likewise, emit the tools' last
+    delivered frame, a `TrackedShaft`.
     """
 
     def __init__(
@@ -206,11 +214,7 @@ class OpticalTracker(Block):
         super().__init__()
         params = params or OpticalTrackerParams()
         check(params)
-        self._constants = packed(
-            lever=params.body.lever,
-            sigma_position=params.body.sigma_position(),
-            sigma_direction=params.body.sigma_direction(),
-        )
+        self._constants = constants(params.body)
         self._losses = _packed_losses(params.losses, tools)
         self._shafts = [self.signal_in(tool, Shaft) for tool in tools]
         self._noise = self.signal_in(

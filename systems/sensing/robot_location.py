@@ -5,19 +5,18 @@ from typing import Any
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.signals import ArmState
 from plants.instruments.instrument import InstrumentParams
-from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.serial_arm import read_arm, tip_position
 from systems.common.signals import Point, RobotTool
-from systems.common.step_block import wired
+from systems.common.step_block import StepBlock
 
 
 @compiled
-def _robot_tool(arm: Any, fulcrum: Point, state: ArmState) -> tuple[RobotTool]:
+def _robot_tool(arm: Any, state: ArmState, fulcrum: Point) -> tuple[RobotTool]:
     return (RobotTool(fulcrum.p, tip_position(arm, state.q)),)
 
 
-class RobotLocation(Block):
+class RobotLocation(StepBlock):
     """The pose of the robot's instrument, from the measured joints.
 
     The arm's own kinematics, evaluated when somebody asks.
@@ -33,13 +32,10 @@ class RobotLocation(Block):
         """Makes the block for an arm that carries an instrument."""
         super().__init__()
         plant = make_controller_plant(instrument=instrument)
-        arm = read_arm(plant, plant.GetFrameByName(INSTRUMENT_TIP))
-        state = self.signal_in("arm_state", ArmState)
-        fulcrum = self.signal_in("fulcrum", Point)
-        locate = wired(_robot_tool, 1, [], [Point, ArmState], [RobotTool], False)
-        self.signal_out(
+        self.declare_map(
+            _robot_tool,
+            [read_arm(plant, plant.GetFrameByName(INSTRUMENT_TIP))],
+            {"arm_state": ArmState, "fulcrum": Point},
             "robot_tool",
             RobotTool,
-            lambda context: locate(arm, fulcrum.Eval(context), state.Eval(context)),
-            {state.ticket(), fulcrum.ticket()},
         )

@@ -13,7 +13,7 @@ import numpy as np
 
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, dot, norm, scaled, sub, unit
-from systems.common.parameter import Rules, check, parameter
+from systems.common.parameter import Rules, check, parameter, part
 from systems.common.signal import Vector, finiteness
 from systems.common.signals import Estimate, Point, TrackedShaft
 from systems.common.step_block import StepBlock
@@ -41,7 +41,7 @@ class TrajectoryEstimatorParams:
     period: float = parameter(
         1 / 60, "of the update: the tracker's", "s", above=0, most=1
     )
-    body: MarkerBody = parameter(MarkerBody, "the markers, as the tracker has them")
+    body: MarkerBody = part(MarkerBody)  # as the tracker has it
     # Of the hand, along each axis.
     sigma_acceleration: float = parameter(
         0.10, "standard deviation of the acceleration", "m/s^2", above=0, most=10

@@ -6,6 +6,7 @@ import pytest
 
 from diagrams.common.scenario import (
     ScenarioError,
+    files,
     find_scenario,
     save_scenario,
     scenario_files,
@@ -46,9 +47,10 @@ def test_every_scenario_loads_and_survives_saving(name, tmp_path: Path):
     assert scenario.seed == 5
     saved = save_scenario(scenario, tmp_path)
     again = load_scenario(str(saved))
-    for key, value in vars(scenario).items():
-        if "recording" not in key:
-            assert getattr(again, key) == value
+    for one in (scenario, again):  # a file that is named lies beside it now
+        for owner, field in files(one):
+            setattr(owner, field, Path(getattr(owner, field)).name)
+    assert again == scenario
 
 
 def test_duration_and_seed_are_checked():

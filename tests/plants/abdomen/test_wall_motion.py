@@ -27,7 +27,7 @@ def test_ventilator_breathes_in_for_two_fifths():
 
 def test_the_wall_steps_in_about_20_ms():
     run = simulate(load_scenario("pwe_step", duration=5.1))
-    t, x = run.signals["time"], run.signals["wall.fulcrum.x"]
+    t, x = run.signals["time"], run.wall.fulcrum.p[:, 0]
     after = t > 5.0 + 0.5 / 120.0
     assert x[t < 5.0].max() < 1e-6
     assert np.interp(5.025, t[after], x[after]) > 0.95 * 0.018

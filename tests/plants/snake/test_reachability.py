@@ -8,7 +8,7 @@ import pytest
 from plants.snake.inverse_kinematics import positioning
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
-from plants.snake.posture import bends_of
+from plants.snake.posture import bends_of, posture_of
 from plants.snake.reachability import refusal
 from systems.common.parameter import check
 
@@ -94,7 +94,7 @@ def test_5000_refused_poses():
     ],
 )
 def test_a_pose_past_one_limit_is_stopped_by_that_limit(limit, q5):
-    X = forward([*q5, 0.0, 0.0], PARAMS)
+    X = forward(posture_of([*q5, 0.0, 0.0]), PARAMS)
     p = X[:3, 3] - (PARAMS.straight_module + PARAMS.tool_offset) * X[:3, 2]
     answer = refusal(p, X[:3, 2], PARAMS)
     assert answer is not None

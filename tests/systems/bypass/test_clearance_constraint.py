@@ -18,7 +18,7 @@ from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
 from systems.common.reach_limits import ReachLimits
 from systems.common.signal import example, flat
-from systems.common.signals import Estimate
+from systems.common.signals import FREE, Estimate, Guide, RobotTool
 
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
@@ -122,6 +122,62 @@ def test_the_borders_of_the_workspace_hold():
     assert angle < 0.5005
 
 
+def test_it_keeps_clear_of_three_obstacles():
+    """R is sent at one after the other, and then between two of them."""
+    obstacles = [
+        estimate((0.02, 0.02, -0.13), (0.09, 0.09, 0.0)),
+        estimate((-0.02, 0.02, -0.13), (-0.09, 0.09, 0.0)),
+        estimate((0.0, -0.025, -0.13), (0.0, -0.12, 0.0)),
+    ]
+    far = estimate((0.3, 0.0, -0.1), (0.3, 0.0, 0.0))
+    dut = ClearanceConstraint(obstacles=("right", "left", "front"))
+    context = dut.CreateDefaultContext()
+    for name, signal in {
+        "guide": example(Guide)._replace(s=1.0),
+        "obstacles": tuple(obstacles),
+        "target": far,
+        "camera": far,
+        "view_cone": NO_CONE,
+        "permission": FREE,
+    }.items():
+        dut.GetInputPort(name).FixValue(context, flat(signal))
+    p, near = (0.0, 0.0, -0.12), np.full(3, np.inf)
+    for goal in [*(tool.p for tool in obstacles), (0.0, 0.05, -0.12)]:
+        for _ in range(120):
+            wanted = geometry.scaled(2.0, geometry.sub(goal, p))
+            robot = RobotTool(G, p)
+            dut.GetInputPort("robot_tool").FixValue(context, flat(robot))
+            dut.GetInputPort("v_R").FixValue(context, wanted)
+            v = dut.GetOutputPort("v_safe").Eval(context)
+            p = moved(p, tuple(v), 1.0 / 60.0)
+            near = np.minimum(
+                near,
+                [
+                    geometry.closest_points(G, p, o.fulcrum, o.p).distance
+                    for o in obstacles
+                ],
+            )
+    # It was near to each, and never nearer than D_safe.
+    assert (near < 0.0075).all() and (near > 0.007 - 1e-4).all()
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_one_of_three_that_is_lost_cannot_be_judged(place):
+    dut = ClearanceConstraint(obstacles=("right", "left", "front"))
+    context = dut.CreateDefaultContext()
+    for index in range(dut.num_input_ports()):
+        port = dut.get_input_port(index)
+        port.FixValue(context, dut.AllocateInputVector(port).value())
+    assert dut.GetOutputPort("status").Eval(context)[2] == 1.0
+    for bad in ({"known": 0.0}, {"p": (np.nan, 0.0, 0.0)}):
+        obstacles = [example(Estimate)] * 3
+        obstacles[place] = obstacles[place]._replace(**bad)
+        dut.GetInputPort("obstacles").FixValue(context, flat(tuple(obstacles)))
+        v_R = dut.GetInputPort("v_R").Eval(context)
+        np.testing.assert_array_equal(dut.GetOutputPort("v_safe").Eval(context), v_R)
+        assert not np.any(dut.GetOutputPort("status").Eval(context))
+
+
 def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
     record = obstacle_tools.constants(Margins())[0]
     o = estimate((0.0, 0.05, -0.1), (0.0, 0.1, 0.0))
@@ -141,6 +197,10 @@ def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
     unsure = around(o)
     extra = 3.0 * np.hypot(3e-4, 0.03 * 0.01)
     assert unsure[0].safe - sure[0].safe == pytest.approx(extra)
+    # Every obstacle has a row of its own, before S and the endoscope.
+    three = around(o, s, c)
+    assert [tool.tip for tool in three[:3]] == [o.p, s.p, c.p]
+    assert three[3:] == sure[1:]
     # The final pose keeps the distance that is planned with from what is left of S.
     rho = pose_distance(sure[1], G, (0.05, 0.0, -0.1))
     assert rho == pytest.approx(Margins().plan_distance + 1e-3, abs=1e-4)

@@ -1,21 +1,29 @@
 """The bypass as a whole: kinematic scenes, waiting, several tools, the block."""
 
 import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
 import pytest
 
-from diagrams.gauze.kinematic_planners import NO_CONE, ROOM
+from diagrams.gauze.kinematic_loop import estimate, run
+from diagrams.gauze.kinematic_planners import BYPASS, CLEARANCE, NO_CONE, ROBOT, ROOM
 from diagrams.gauze.scenes import CONTACT, scene
 from systems.bypass.bypass_route import OVER, STRAIGHT, choose_way
+from systems.bypass.clearance_constraint import ClearanceConstraint
+from systems.bypass.obstacle_tools import Margins
 from systems.bypass.shadow_body import ObstacleTool, pose_distance, read_tool
 from systems.bypass.tool_bypass import (
     State,
     ToolBypass,
     ToolBypassParams,
+    Way,
     constants,
 )
+from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
+from systems.common.reach_limits import ReachLimits
 from systems.common.signal import example, flat, size, view
-from systems.common.signals import Estimate, Guide
+from systems.common.signals import Estimate, Guide, RobotTool
 
 G = (0.0, 0.0, 0.0)
 RECORD = constants(ToolBypassParams())[0]
@@ -137,6 +145,89 @@ def test_the_block_runs_down_while_a_tool_is_lost():
     dut.GetInputPort("obstacles").FixValue(context, np.full(size(Estimate), np.nan))
     for name in ("v1", "guide", "way"):
         assert np.isfinite(dut.GetOutputPort(name).Eval(context)).all()
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_the_block_runs_down_while_one_of_three_is_lost(place):
+    dut = ToolBypass(obstacles=("a", "b", "c"))
+    context = fixed(dut)
+    state = context.get_mutable_discrete_state_vector()
+    state.SetFromVector(flat(State((0.05, 0.0, 0.0), -1.0 / 60.0, 0.0, 0.0, 0.0)))
+    for bad in ({"known": 0.0}, {"p": (np.nan, 0.0, 0.0)}):
+        obstacles = [example(Estimate)] * 3
+        obstacles[place] = obstacles[place]._replace(**bad)
+        dut.GetInputPort("obstacles").FixValue(context, flat(tuple(obstacles)))
+        assert tip_speed(dut, context) == pytest.approx(0.05 - 1.0 / 60.0, abs=1e-9)
+        assert np.isfinite(dut.GetOutputPort("guide").Eval(context)).all()
+
+
+class Blocks:
+    """The bypass and the constraint behind it as blocks, for the kinematic loop."""
+
+    def __init__(self, names):
+        margins = Margins(avoid_target=False, avoid_camera=False)
+        reach = ReachLimits(
+            min_insertion=ROBOT.least_insertion, max_insertion=0.5, max_tilt=3.1
+        )
+        around = (margins, reach, WorkspaceParams(floor=-0.065), names)
+        builder = DiagramBuilder()
+        first = builder.AddSystem(ToolBypass(BYPASS, *around))
+        second = builder.AddSystem(ClearanceConstraint(CLEARANCE, *around))
+        for output, port in (("v1", "v_R"), ("guide", "guide")):
+            builder.Connect(first.GetOutputPort(output), second.GetInputPort(port))
+        for name in ("robot_tool", "obstacles", "target", "camera", "view_cone"):
+            builder.ExportInput(first.GetInputPort(name), name)
+            builder.ConnectInput(name, second.GetInputPort(name))
+        for block, name in ((first, "guide"), (first, "way"), (second, "v_safe")):
+            builder.ExportOutput(block.GetOutputPort(name), name)
+        self.diagram = builder.Build()
+        self.simulator, self.ways = Simulator(self.diagram), set()
+
+    def step(self, dt, robot, obstacle, target, others=()):
+        """The velocity of the robot's tip, see `Planner`."""
+        context = self.simulator.get_mutable_context()
+        for name, value in {
+            "robot_tool": robot,
+            "obstacles": (obstacle, *others),
+            "target": target,
+            "camera": target,
+            "view_cone": NO_CONE,
+        }.items():
+            self.diagram.GetInputPort(name).FixValue(context, flat(value))
+        out = {
+            name: np.array(self.diagram.GetOutputPort(name).Eval(context))
+            for name in ("guide", "way", "v_safe")
+        }
+        self.ways.add(int(view(Way, out["way"]).way))
+        self.simulator.AdvanceTo(context.get_time() + dt)
+        return tuple(out["v_safe"] / view(Guide, out["guide"]).s)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 3])
+def test_the_blocks_pass_two_and_three_tools_that_stand(number):
+    given = scene("crowded", 5, number)
+    count = 1 + len(given.others)
+    assert count == 2 + number % 2
+    planner = Blocks([f"obstacle_{i}" for i in range(count)])
+    outcome = run(given, planner)
+    assert outcome.reached and outcome.clearance > 0.0015
+    assert planner.ways - {STRAIGHT}  # one was in its way
+
+
+def test_edges_are_numbered_in_the_obstacles_order():
+    tools = [
+        estimate((0.0, -0.012, -0.055), (0.0, 0.1, 0.0)),  # across, the others aside
+        estimate((0.0, 0.12, -0.08), (0.0, 0.15, 0.0)),
+        estimate((0.0, -0.12, -0.08), (0.0, -0.15, 0.0)),
+    ]
+    robot = RobotTool(G, (-0.05, 0.0, -0.06))
+    target = estimate((0.05, 0.0, -0.06), G)
+    for place, order in enumerate(([0, 1, 2], [1, 0, 2], [1, 2, 0])):
+        planner = Blocks(["a", "b", "c"])
+        first, *others = [tools[i] for i in order]
+        planner.step(1.0 / 60.0, robot, first, target, others)
+        (way,) = planner.ways
+        assert way in (2 * place + 1, 2 * place + 2)
 
 
 def test_the_block_starts_off_with_bounded_acceleration():

@@ -39,12 +39,14 @@ def run(v_R, seconds=0.5, s=0.5, params=None, **changes):
     Returns its motion and the stop's codes after every update.
     """
     p_WP = (0.0, 0.0, -0.1)
-    dut = ToolNavigation(params, p_WP, P_WG)
+    obstacles = changes.pop("obstacles", [example(Estimate)])
+    names = [f"obstacle_{i}" for i in range(len(obstacles))]
+    dut = ToolNavigation(params, p_WP, P_WG, names)
     context = dut.CreateDefaultContext()
     inputs = {
         "v_R": Velocity(tuple(v_R)),
         "guide": example(Guide)._replace(s=s),
-        "obstacles": example(Estimate),
+        "obstacles": tuple(obstacles),
         "target": TARGET,
         "view_cone": WIDE_CONE,
     }
@@ -123,8 +125,8 @@ def test_gauze_stays_in_the_view_cone():
     [
         ({}, Stop.MOVING),
         ({"target": TARGET._replace(known=0.0)}, Stop.TARGET_LOST),
-        ({"obstacles": TARGET._replace(known=0.0)}, Stop.OBSTACLE_LOST),
-        ({"obstacles": TARGET._replace(sigma_p=1.0)}, Stop.WAITING),
+        ({"obstacles": [TARGET._replace(known=0.0)]}, Stop.OBSTACLE_LOST),
+        ({"obstacles": [TARGET._replace(sigma_p=1.0)]}, Stop.WAITING),
         ({"guide": example(Guide)._replace(rho=math.nan)}, Stop.NOT_A_NUMBER),
         ({"target": TARGET._replace(p=(0.0, 0.0, -0.5))}, Stop.OUT_OF_REACH),
         ({"target": TARGET._replace(p=(0.2, 0.0, -0.1))}, Stop.OUT_OF_REACH),
@@ -140,6 +142,26 @@ def test_why_the_robot_stands(changes, stop):
     assert codes[-1] == (stop or Stop.MOVING)
     speed = lengths(tool.v[-1])
     assert all(np.isfinite(part).all() for part in tool)
+    assert (speed > 0.01) if stop == Stop.MOVING else speed == 0.0
+
+
+@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize(
+    ("bad", "stop"),
+    [
+        ({}, Stop.MOVING),
+        ({"known": 0.0}, Stop.OBSTACLE_LOST),
+        ({"known": 0.0, "sigma_p": 1.0}, Stop.WAITING),
+        ({"p": (math.nan, 0.0, 0.0)}, Stop.NOT_A_NUMBER),
+        ({"known": math.nan}, Stop.NOT_A_NUMBER),
+    ],
+)
+def test_one_of_three_obstacles_is_enough_to_stop(place, bad, stop):
+    obstacles = [example(Estimate)] * 3
+    obstacles[place] = obstacles[place]._replace(**bad)
+    tool, codes = run([0.01, 0.0, 0.0], 0.5, obstacles=obstacles)
+    assert codes[-1] == stop
+    speed = lengths(tool.v[-1])
     assert (speed > 0.01) if stop == Stop.MOVING else speed == 0.0
 
 

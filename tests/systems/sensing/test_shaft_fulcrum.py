@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from systems.common.compiled import packed
 from systems.common.signal import vector
 from systems.common.signals import Shaft
+from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import MarkerBody, MarkerNoise, disturb
 from systems.sensing.shaft_fulcrum import (
     FIRST,
@@ -22,11 +22,7 @@ from systems.sensing.trajectory_estimator import (
 )
 
 BODY = MarkerBody()
-MARKERS = packed(
-    lever=BODY.lever,
-    sigma_position=BODY.sigma_position(),
-    sigma_direction=BODY.sigma_direction(),
-)[0]
+MARKERS = optical_tracker.constants(BODY)[0]
 G = np.array([0.02, 0.09, 0.004])
 
 

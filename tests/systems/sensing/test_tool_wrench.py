@@ -10,7 +10,7 @@ from diagrams.common.run import simulate
 from diagrams.studies import load_scenario
 from diagrams.wrist.diagram import make_wrist_diagram
 from systems.common.signal import flat, view
-from systems.common.signals import MovingPoint, ShaftMotion, Wrench
+from systems.common.signals import Wrench
 from systems.sensing import sensor_noise
 from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
 
@@ -30,19 +30,11 @@ def quiet_run():
     return run
 
 
-def shaft_of(run):
-    return view(ShaftMotion, run.matrix("wrist.shaft"))
-
-
-def wrench_of(run):
-    return view(Wrench, run.matrix("wrist.wrench"))
-
-
 def test_a_quiet_sensor_reads_the_walls_force_while_the_arm_moves():
     run = quiet_run()
-    f, u = wrench_of(run).f, shaft_of(run).u
+    f, u = run.wrist.wrench.f, run.wrist.shaft.u
     lateral = f - u * np.sum(f * u, axis=1)[:, None]
-    force = run.matrix("wall.force")
+    force = run.wall.force.f
     late = run.signals["time"] > 0.1
     assert np.linalg.norm(force[late], axis=1).max() > 0.9  # the probe
     np.testing.assert_allclose(lateral[late], force[late], atol=2e-3)
@@ -50,13 +42,11 @@ def test_a_quiet_sensor_reads_the_walls_force_while_the_arm_moves():
 
 def test_the_moment_tells_the_contacts_depth():
     run = quiet_run()
-    shaft, (f, m, _) = shaft_of(run), wrench_of(run)
-    force = run.matrix("wall.force")
-    loaded = np.linalg.norm(force, axis=1) > 0.8
+    shaft, (f, m, _) = run.wrist.shaft, run.wrist.wrench
+    loaded = np.linalg.norm(run.wall.force.f, axis=1) > 0.8
     across = np.cross(shaft.u, f)
     lever = np.sum(across * m, axis=1) / np.sum(across**2, axis=1)
-    p_WI = view(MovingPoint, run.matrix("wall.fulcrum")).p
-    true = np.sum(shaft.u * (p_WI - shaft.p), axis=1)
+    true = np.sum(shaft.u * (run.wall.fulcrum.p - shaft.p), axis=1)
     np.testing.assert_allclose(lever[loaded], true[loaded], atol=5e-4)
 
 
