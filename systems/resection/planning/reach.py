@@ -180,7 +180,7 @@ def _lumps(
     sizes = np.bincount(parts.ravel(), minlength=count + 1)
     boxes = ndimage.find_objects(parts)
     found = []
-    order = np.argsort(sizes[1:], kind="stable")[::-1]
+    order = np.argsort(-sizes[1:], kind="stable")
     for n in order:
         box = boxes[n]
         mask = parts[box] == n + 1

@@ -37,11 +37,12 @@ from systems.resection.wires.wire_forward_actuation import WireForwardActuation
 from systems.resection.wires.wire_inverse_actuation import (
     WireInverseActuation,
     WireInverseActuationParams,
+    wound_lengths,
 )
 from systems.resection.wires.wire_tension import WireTension, WireTensionParams
 from systems.resection.wires.wire_watch import WireWatch, WireWatchParams
 
-SNAKE = SnakeParams()
+SNAKE, DRIVE = SnakeParams(), SnakeDriveParams()
 BENDS = [0.01, 0.4, 0.3, -1.2, 0.5, 2.5, 0.7]
 POSTURE = posture_of(BENDS)
 STRAIGHT = [*wire_lengths(np.zeros(7), SNAKE), 0.0]
@@ -140,6 +141,36 @@ def test_forward_actuation_leads_by_lag_and_period():
     context = fixed(dut, lengths=one, rates=(two - one) / lead)
     desired = out(dut, context, "desired_state")
     np.testing.assert_allclose(desired[1:7], later[1:], atol=1e-6)
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, 1.0])
+def test_broken_lengths_leave_the_set_point_where_it_was(broken):
+    """No numbers, or a length that no posture has."""
+    dut = WireForwardActuation()
+    drums = np.append(wire_lengths(POSTURE, SNAKE), POSTURE[0])
+    context = fixed(dut, lengths=drums, rates=np.zeros(10))
+    before = out(dut, context, "desired_state")
+    tick(dut, context)
+    for wire in (0, 8):
+        worse = drums.copy()
+        worse[wire] = broken
+        dut.GetInputPort("lengths").FixValue(context, worse)
+        np.testing.assert_array_equal(out(dut, context, "desired_state"), before)
+        tick(dut, context)
+
+
+def test_a_broken_posture_leaves_the_drums_where_they_were():
+    dut = WireInverseActuation(posture=POSTURE)
+    context = fixed(dut, posture=np.full(7, math.nan))
+    held = wound_lengths(POSTURE, WireInverseActuationParams(), SNAKE, DRIVE)
+    np.testing.assert_array_equal(out(dut, context, "drums"), held)
+    other = posture_of([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    dut.GetInputPort("posture").FixValue(context, other)
+    good = out(dut, context, "drums")
+    assert (good != held).any()
+    tick(dut, context)
+    dut.GetInputPort("posture").FixValue(context, [math.inf] * 7)
+    np.testing.assert_array_equal(out(dut, context, "drums"), good)
 
 
 def test_sag_is_made_up_for():
@@ -262,6 +293,14 @@ def test_watch_raises_one_alarm_and_keeps_it():
     tick(dut, context)
     assert out(dut, context, "stop") == [1.0]
     np.testing.assert_allclose(out(dut, context, "alarm"), [0.08, 3.0])
+
+
+def test_a_tension_that_is_no_number_counts_as_slack():
+    dut = WireWatch(WireWatchParams(samples=1))
+    context = fixed(dut, tension=[4.0] * 4 + [math.nan] + [4.0] * 4)
+    tick(dut, context)
+    assert out(dut, context, "stop") == [1.0]
+    np.testing.assert_array_equal(out(dut, context, "alarm"), [0.0, 2.0])
 
 
 def test_reference_circle():
