@@ -107,7 +107,7 @@ def _file(module: str) -> str:
         return ""
     try:
         spec = find_spec(module)
-    except ModuleNotFoundError:  # a name in a module, which is no package
+    except (ModuleNotFoundError, ValueError):  # a name in a module; a script
         return ""
     origin = str(spec and spec.has_location and spec.origin)
     return origin if origin.endswith(".py") else ""
@@ -199,9 +199,11 @@ class _Stamped:
         return _stamp(self._function)
 
     def get_disambiguator(self) -> str:
-        """Tells functions of a file apart, also those made with `exec`."""
+        """Tells functions of a file apart, also generated ones of the same text."""
         code = marshal.dumps(self._function.__code__, 2)
-        return hashlib.sha256(code).hexdigest()[:12]
+        origins = [(file, *sorted(words)) for file, words in _origins(self._function)]
+        text = repr(sorted(origins)).encode()
+        return hashlib.sha256(code + text).hexdigest()[:12]
 
 
 class InTree(_Stamped, InTreeCacheLocator):

@@ -52,6 +52,13 @@ def test_division_by_zero_gives_infinity():
     assert inverse(0.0) == np.inf
 
 
+def test_a_function_of_no_file_is_compiled_too():
+    scope = {"compiled": compiled}
+    source = "@compiled\ndef twice(x):\n    return 2.0 * x"
+    exec(compile(source, "<a notebook's cell>", "exec"), scope)
+    assert scope["twice"](2.0) == 4.0
+
+
 def test_compilation_is_announced_once_at_a_terminal(capsys, monkeypatch):
     @numba.njit
     def one(x):
@@ -139,9 +146,12 @@ PACKAGES = {
         exec(compile("def made(x):\\n return RATE + x", __file__, "exec"))
         like_by_exec = compiled(made)
 
-        scope = {"step": fourfold, "__name__": __name__}
-        exec(compile("def given(x):\\n return step(x)", __file__, "exec"), scope)
-        given = compiled(scope["given"])
+        def generated(step):
+            scope = {"step": step, "__name__": __name__}
+            exec(compile("def made(x):\\n return step(x)", __file__, "exec"), scope)
+            return compiled(scope["made"])
+
+        given, like_given = generated(fourfold), generated(twice)
 
         @compiled
         def alone(x, more=0.5):
@@ -150,7 +160,7 @@ PACKAGES = {
         if __name__ == "__main__":
             for name in (
                 "by_name by_module by_constant by_derived_constant two_files_away "
-                "by_exec like_by_exec given alone"
+                "by_exec like_by_exec given like_given alone"
             ).split():
                 f = globals()[name]
                 print(name, f(1.0), len(f.stats.cache_hits))
@@ -168,6 +178,7 @@ RESULTS = {
     "by_exec": 11.0,
     "like_by_exec": 101.0,
     "given": 4.0,
+    "like_given": 2.0,
     "alone": 1.5,
     "by_type": 5.0,
 }
@@ -176,7 +187,13 @@ EDITS = [
     (
         "ground/vectors.py",
         ("2.0 * x", "3.0 * x"),
-        {"by_name": 4.0, "by_module": 5.0, "two_files_away": 12.0, "given": 9.0},
+        {
+            "by_name": 4.0,
+            "by_module": 5.0,
+            "two_files_away": 12.0,
+            "given": 9.0,
+            "like_given": 3.0,
+        },
     ),
     (
         "ground/sizes.py",
