@@ -5,7 +5,7 @@ from typing import Any
 from pydrake.geometry import Rgba, Sphere
 from pydrake.math import RigidTransform
 
-from diagrams.common.replay import draw_arrow
+from diagrams.common.replay import draw_arrow, thinned
 
 METRES_PER_NEWTON = 0.03
 """Scale of the replay's force arrow."""
@@ -22,7 +22,7 @@ def draw_point(
 ) -> None:
     """A ball that moves along `points` (n, 3) [m]; wider than the trocar's tube."""
     meshcat.SetObject(path, Sphere(radius), Rgba(*rgba))
-    for index in range(0, len(times), 4):
+    for index in range(0, len(times), 4 * thinned(len(times) // 4)):
         frame = animation.frame(times[index])
         animation.SetTransform(frame, path, RigidTransform(points[index]))
 

@@ -114,10 +114,13 @@ def run_command(arguments: argparse.Namespace) -> int:
     run = run_scenario(scenario, out, not arguments.no_replay, progress_bar)
     if run.metrics:
         print(table(run.metrics))
-    replay = "replay.html, " if not arguments.no_replay else ""
-    print(f"\n{replay}metrics.json, signals.csv, scenario.yaml and plots: {out}/")
+    print(f"\n{', '.join(sorted(path.name for path in out.glob('[!.]*.*')))}: {out}/")
     if run.error:
-        print(f"trocar: the run ended early at {run.simulated:.3f} s: {run.error}")
+        end = f"ended early at {run.simulated:.3f} s"
+        print(
+            f"trocar: the run {'failed' if run.is_over else end}: {run.error}",
+            file=sys.stderr,
+        )
         return 1
     return 0
 

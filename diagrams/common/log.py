@@ -74,6 +74,20 @@ def read_log(
     return signals
 
 
+def first_fault(signals: Mapping[str, np.ndarray]) -> str:
+    """The first sample of a log that is no finite number, in words; "" if none is."""
+    faults = [
+        (samples.argmin(), name)
+        for name, samples in ((n, np.isfinite(s)) for n, s in signals.items())
+        if not samples.all()
+    ]
+    if not faults:
+        return ""
+    row, name = min(faults)
+    time, value = signals["time"][row], signals[name][row]
+    return f"signal {name!r} is {value} at {time:.3f} s"
+
+
 def save_signals(signals: dict[str, np.ndarray], path: Path) -> None:
     """Writes the log as CSV, one column a signal: `pandas.read_csv(path)`."""
     table = np.column_stack(list(signals.values()))

@@ -1,5 +1,7 @@
 """Running a scenario: prepare, build, advance, log; then measure, plot and replay."""
 
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 import gc
 import json
@@ -19,10 +21,18 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common import metrics, replay
 from diagrams.common.case import Case
-from diagrams.common.log import add_log, named, read_log, save_signals
+from diagrams.common.log import (
+    add_log,
+    columns,
+    first_fault,
+    named,
+    read_log,
+    save_signals,
+)
 from diagrams.common.plots import save_figure
 from diagrams.common.progress import Progress, Show, progress_of, silent
-from diagrams.common.scenario import ScenarioError, refusals, save_scenario
+from diagrams.common.results import Results, results, save_scenario
+from diagrams.common.scenario import ScenarioError, refusals
 from diagrams.common.study import Study
 from diagrams.studies import build, check_scenario, get_study
 from systems.common.compiled import rehearse
@@ -30,6 +40,9 @@ from systems.common.stopwatch import STOPWATCH
 
 INTERRUPTED = "interrupted"
 """Error of a run that was interrupted."""
+
+LARGEST_LOG = 2e9
+"""Of a run, in bytes."""
 
 
 @dataclass
@@ -46,7 +59,7 @@ class Run:
         simulated: Simulated seconds reached.
         instants: Wall seconds of all blocks, one for every whole control instant.
         updates: Median wall seconds of one update, by block.
-        error: Why the run ended early, or "".
+        error: Why the run ended early or failed, or "".
         duration: Simulated seconds that the whole run takes.
         replay_speed: Simulated seconds that a second of the replay shows.
         metrics: The figures, once measured.
@@ -71,11 +84,32 @@ class Run:
         """What ran, as it was written."""
         return self.case.scenario
 
+    @property
+    def is_over(self) -> bool:
+        """Whether the whole of it was simulated."""
+        return self.simulated >= self.duration > 0.0
+
     def __getattr__(self, name: str) -> Any:
         """What was logged below a name: `run.planner.guide.rho` is an array (n)."""
         if name.startswith("_"):  # asked for by who copies it
             raise AttributeError(name)
         return named(self.logged, self.signals, name)
+
+
+@contextmanager
+def survived(run: Run, what: str = "") -> Iterator[None]:
+    """What fails or is interrupted in this context does not take the run with it.
+
+    Args:
+        run: Its `error` says why, if there is none yet.
+        what: Is being done, for the message.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        run.error = run.error or what + INTERRUPTED
+    except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
+        run.error = run.error or f"{what}{type(error).__name__}: {error}"
 
 
 def start(diagram: Any, config: SimulatorConfig, context: Any = None) -> Simulator:
@@ -101,7 +135,7 @@ def prepare(scenario: Any, progress: Progress = silent) -> Case:
         case = study.prepare(scenario, progress)
     for name, other in study.companions(scenario).items():
         beside = simulate(other, progress=progress_of(name, progress))
-        if beside.error == INTERRUPTED:
+        if beside.error.endswith(INTERRUPTED):
             raise KeyboardInterrupt
         case.companions[name] = beside
     return case
@@ -135,6 +169,7 @@ def simulate_diagram(
     diagram: Any,
     meshcat: Any = None,
     progress: Progress = silent,
+    save: Callable[[Run], None] = lambda run: None,
 ) -> Run:
     """Runs a diagram of one's own making, for example with swapped blocks.
 
@@ -143,14 +178,19 @@ def simulate_diagram(
         diagram: Exports the ports that the scenario's study logs.
         meshcat: As for `simulate`.
         progress: As for `simulate`.
+        save: Called once there is all that was logged, before it is measured.
+
+    Raises:
+        ScenarioError: If the log would be too large.
     """
     case = scenario if isinstance(scenario, Case) else prepare(scenario, progress)
     study = get_study(case.scenario.system)
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
     logged = study.signals(case.scenario)
-    sink = add_log(builder, station, logged, study.log_period)
     duration = study.length(case)
+    check_log(logged, duration, study.log_period)
+    sink = add_log(builder, station, logged, study.log_period)
     speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
@@ -164,26 +204,41 @@ def simulate_diagram(
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
-        with progress("running", "simulated s") as show:
+        with survived(run), progress("running", "simulated s") as show:
             advance(run, simulator, recorder, show)
-    except KeyboardInterrupt:
-        run.error = INTERRUPTED
-    except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
-        run.error = f"{type(error).__name__}: {error}"
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    try:
+    with survived(run, "what was done could not be saved: "):
         study.keep(case, station, context, True)
-    except OSError as error:
-        run.error = run.error or f"what was done could not be saved: {error}"
     run.signals = read_log(sink, logged, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
+    run.error = run.error or first_fault(run.signals)
+    with survived(run, "signals could not be saved: "):
+        save(run)
     if len(run.signals["time"]) > 1:
-        run.metrics = metrics.common(run) | study.measure(run)
-    recorder.finish(run)
+        with survived(run, "figures could not be measured: "):
+            run.metrics = study.measure(run)
+        run.metrics = metrics.common(run) | run.metrics
+    with survived(run, "replay could not be drawn: "):
+        recorder.finish(run)
     return run
+
+
+def check_log(logged: Mapping[str, Any], duration: float, period: float) -> None:
+    """Refuses a run whose log would not fit into memory, before it is asked for.
+
+    Raises:
+        ScenarioError: The longest duration that fits is named.
+    """
+    width = 1 + sum(len(columns(port, kind)) for port, kind in logged.items())
+    longest = LARGEST_LOG / (8 * width) * period
+    if duration > longest:
+        raise ScenarioError(
+            f"duration={duration:.6g} s: expected <= {longest:.6g}; the log of {width} "
+            f"columns every {period:.3g} s takes {LARGEST_LOG / 1e9:.3g} GB then"
+        )
 
 
 def replay_speed(study: Study, duration: float) -> float:
@@ -206,6 +261,7 @@ def advance(
 ) -> None:
     """Steps the simulator from frame to frame; only the steps are timed."""
     duration, period = run.duration, run.replay_speed / run.study.frame_rate
+    every = replay.thinned(math.ceil(duration / period))
     simulator.Initialize()
     recorder.draw(simulator.get_context())
     station = run.diagram.GetSubsystemByName("station")
@@ -217,22 +273,10 @@ def advance(
         start = perf_counter()
         simulator.AdvanceTo(time)
         run.wall_time += perf_counter() - start
-        recorder.draw(simulator.get_context())
+        if frame % every == 0 or time == duration:
+            recorder.draw(simulator.get_context())
         show(time, duration)
         run.study.keep(run.case, station, simulator.get_context(), False)
-
-
-def prepare_folder(out: Path) -> None:
-    """Makes the output folder, or raises a ScenarioError if it cannot be written."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        probe = out / ".writable"
-        probe.write_text("")
-        probe.unlink()
-    except OSError as error:
-        raise ScenarioError(
-            f"cannot write to the output folder {str(out)!r}: {error.strerror}"
-        ) from error
 
 
 def run_scenario(
@@ -243,23 +287,45 @@ def run_scenario(
 ) -> Run:
     """Runs a scenario and writes all its results into a folder.
 
-    Writes `scenario.yaml`, `signals.csv`, `metrics.json`, the plots as PNG and
-    `replay.html`, in this order, so that nothing computed is lost if a later
-    one fails.
+    Writes `scenario.yaml` with the files that it names, `signals.csv`,
+    `metrics.json`, the plots as PNG and `replay.html`, in this order, so that nothing
+    computed is lost if a later one fails. What an earlier run left there stays until
+    this one begins, and then goes.
 
     Raises:
-        ScenarioError: If the scenario cannot run or the folder not be written.
+        ScenarioError: If the scenario cannot run, the folder not be written, or
+            another run writes to it.
     """
-    prepare_folder(out)
     check_scenario(scenario)
-    meshcat = replay.start_meshcat() if with_replay else None
-    save_scenario(scenario, out)
-    run = simulate(scenario, meshcat, progress)
-    save_signals(run.signals, out / "signals.csv")
-    (out / "metrics.json").write_text(json.dumps(run.metrics, indent=2) + "\n")
-    if run.metrics:
-        for name, figure in run.study.plots(run).items():
-            save_figure(figure, out / f"{name}.png")
-    if meshcat is not None:
-        (out / "replay.html").write_text(meshcat.StaticHtml())
+    with results(out) as into:
+        case = prepare(scenario, progress)
+        diagram = build(case)
+        meshcat = replay.start_meshcat() if with_replay else None
+        try:
+            save_scenario(scenario, into)
+        except OSError as error:
+            raise ScenarioError(f"cannot write to {str(out)!r}: {error}") from error
+
+        def save(run: Run) -> None:
+            with into.file("signals.csv") as draft:
+                save_signals(run.signals, draft)
+
+        run = simulate_diagram(case, diagram, meshcat, progress, save)
+        with survived(run, "results could not be saved: "):
+            write(run, into)
+            if meshcat is not None:
+                with into.file("replay.html") as draft:
+                    draft.write_text(meshcat.StaticHtml())
     return run
+
+
+def write(run: Run, into: Results) -> None:
+    """Writes a run's figures and plots."""
+    with into.file("metrics.json") as draft:
+        draft.write_text(json.dumps(run.metrics, indent=2) + "\n")
+    figures = {}
+    with survived(run, "plots could not be drawn: "):
+        figures = run.study.plots(run) if run.metrics else {}
+    for name, figure in figures.items():
+        with into.file(f"{name}.png") as draft:
+            save_figure(figure, draft)

@@ -1,16 +1,10 @@
-"""Scenarios: what all of them have, where their files lie, how one is saved."""
+"""Scenarios: what all of them have, and where their files lie."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from copy import deepcopy
-import dataclasses
 from dataclasses import dataclass
 import difflib
 from pathlib import Path
-import shutil
-from typing import Any
-
-import yaml
 
 from systems.common.parameter import parameter
 
@@ -76,32 +70,3 @@ def find_scenario(name: str) -> Path:
             return path
         raise ScenarioError(f"no scenario file {name!r}")
     raise ScenarioError(f"no scenario {name!r}: {nearest(name, files)}")
-
-
-def save_scenario(scenario: Any, folder: Path) -> Path:
-    """Writes `scenario.yaml`, and copies of the files it names, into a folder.
-
-    Returns:
-        The file; loading it repeats the run.
-    """
-    copy = deepcopy(scenario)
-    for owner, name in files(copy):
-        source = Path(getattr(owner, name))
-        target = folder / source.name
-        if target.resolve() != source.resolve():
-            shutil.copyfile(source, target)
-        setattr(owner, name, target.name)
-    path = folder / "scenario.yaml"
-    path.write_text(yaml.safe_dump(dataclasses.asdict(copy), sort_keys=False))
-    return path
-
-
-def files(params: Any) -> Iterator[tuple[Any, str]]:
-    """Every field that names a file: the dataclass it is in, and its name there."""
-    for field in dataclasses.fields(params):
-        value, told = getattr(params, field.name), field.metadata.get("parameter")
-        if told and told.file and value:
-            yield params, field.name
-        for item in value if isinstance(value, list) else [value]:
-            if dataclasses.is_dataclass(item):
-                yield from files(item)

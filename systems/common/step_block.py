@@ -1,6 +1,7 @@
 """The base of blocks whose update is one compiled step."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 import hashlib
 from itertools import pairwise
 from operator import methodcaller
@@ -56,8 +57,21 @@ def wired(
         timed: Whether the step takes the time.
 
     Returns:
-        The map; it returns one array, what the step returns one after the other.
+        The map; it returns one array, what the step returns one after the other. All
+        blocks of a kind share it: compiled code is never freed.
     """
+    return _wired(step, constants, tuple(states), tuple(inputs), tuple(gives), timed)
+
+
+@cache
+def _wired(
+    step: Callable[..., Any],
+    constants: int,
+    states: tuple[Any, ...],
+    inputs: tuple[Any, ...],
+    gives: tuple[Any, ...],
+    timed: bool,
+) -> Step:
     kinds = [*states, *inputs]
     records = [f"k{i}" for i in range(constants)]
     arrays = [f"a{i}" for i in range(len(kinds))]

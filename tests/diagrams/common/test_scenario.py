@@ -4,13 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from diagrams.common.scenario import (
-    ScenarioError,
-    files,
-    find_scenario,
-    save_scenario,
-    scenario_files,
-)
+from diagrams.common.results import files, results, save_scenario
+from diagrams.common.scenario import ScenarioError, find_scenario, scenario_files
 from diagrams.studies import load_scenario
 
 
@@ -45,7 +40,8 @@ def test_every_scenario_loads_and_survives_saving(name, tmp_path: Path):
     scenario = load_scenario(name, seed=5)
     assert scenario.description
     assert scenario.seed == 5
-    saved = save_scenario(scenario, tmp_path)
+    with results(tmp_path) as into:
+        saved = save_scenario(scenario, into)
     again = load_scenario(str(saved))
     for one in (scenario, again):  # a file that is named lies beside it now
         for owner, field in files(one):

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from diagrams.common.scenario import Scenario, ScenarioError, save_scenario
+from diagrams.common.results import results, save_scenario
+from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.common.tree import apply_override, fit, read_tree, read_yaml
 from diagrams.studies import load_scenario
 
@@ -169,7 +170,8 @@ def test_an_override_without_form_is_refused(text, message):
 def test_a_scenario_takes_what_people_write_and_keeps_it(tmp_path):
     overrides = ["wrist=off", "compare=[off, known]", "abdomen.stiffness=2e3"]
     scenario = load_scenario("pwe_arc", [*overrides, "description=1e-3"], duration=3)
-    saved = save_scenario(scenario, tmp_path)
+    with results(tmp_path) as into:
+        saved = save_scenario(scenario, into)
     for loaded in (scenario, load_scenario(str(saved))):
         assert loaded.wrist == "off" and loaded.compare == ["off", "known"]
         assert loaded.abdomen.stiffness == 2000.0

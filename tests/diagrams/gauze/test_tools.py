@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from diagrams.common.results import results, save_scenario
 from diagrams.common.run import simulate
-from diagrams.common.scenario import ScenarioError, save_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.tools import gap, hands
 from diagrams.studies import load_scenario
 
@@ -25,7 +26,8 @@ def test_keys_reach_a_tool_by_its_name(tmp_path):
     assert scenario.camera.p_WG == [0.13, 0.12, 0.0]
     hunted = load_scenario("gauze_static", ["hunt.speed=0.01", "hunt.end=5"])
     assert hunted.obstacles[0].hunt.speed == 0.01
-    again = load_scenario(str(save_scenario(hunted, tmp_path)))
+    with results(tmp_path) as into:
+        again = load_scenario(str(save_scenario(hunted, into)))
     assert again.tools == hunted.tools
 
 
