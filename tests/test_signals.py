@@ -92,7 +92,7 @@ def test_no_signal_is_read_by_a_literal_index():
         if reads:
             found[str(file.relative_to(ROOT))] = reads
     assert not found
-    assert not [f for f in FILES if ".matrix(" in f.read_text()]
+    assert not [f for f in FILES if "run.matrix(" in f.read_text()]
 
 
 def test_what_is_logged_is_what_the_ports_emit():

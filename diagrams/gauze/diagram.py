@@ -86,11 +86,18 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
         ("tracker_noise.output", "optical_tracker.noise"),
         ("endoscope.shaft", f"posed_tools.{scenario.camera.name}"),
     ]
-    for name in hands(scenario.tools, scenario.seed):
+    for name, tool in hands(scenario.tools, scenario.seed).items():
         wires += [
             (f"{name}_tool.shaft", f"optical_tracker.{name}"),
             (f"optical_tracker.{name}_measured", f"{name}_estimator.measurement"),
             (f"{name}_tool.shaft", f"posed_tools.{name}"),
+        ]
+        if tool.hunt.speed:
+            wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))
+    if len(scenario.obstacles) > 1:
+        wires += [
+            (f"{tool.name}_estimator.estimate", f"obstacle_estimates.u{index}")
+            for index, tool in enumerate(scenario.obstacles)
         ]
     return wires
 
@@ -223,6 +230,26 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
     return blocks
 
 
+def wiring(
+    scenario: GauzeScenario, systems: Mapping[str, Any]
+) -> tuple[list[tuple[str, str]], dict[str, str]]:
+    """All wires between the systems, and what is exported of them.
+
+    Args:
+        scenario: The parameters.
+        systems: Plant and blocks by their names.
+    """
+    wires = [*WIRES, *tool_wires(scenario)]
+    exports = EXPORTS | tool_exports(scenario)
+    if scenario.emulated:
+        wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
+        exports |= WRIST_EXPORTS
+    wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
+    exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    known = aliases(scenario)
+    return [(known.get(source, source), sink) for source, sink in wires], exports
+
+
 def make_gauze_diagram(
     scenario: GauzeScenario, swaps: Mapping[str, Any] | None = None
 ) -> Any:
@@ -243,21 +270,7 @@ def make_gauze_diagram(
     theatre = add_theatre(builder, scenario)
     blocks = add_blocks(builder, make_blocks(scenario, theatre.posture), swaps)
     systems = theatre.systems | blocks
-    wires = [*WIRES, *tool_wires(scenario)]
-    exports = EXPORTS | tool_exports(scenario)
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
-        wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
-        exports |= WRIST_EXPORTS
-    wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
-    for index, tool in enumerate(scenario.obstacles):
-        if len(scenario.obstacles) > 1:
-            estimate = f"{tool.name}_estimator.estimate"
-            wires.append((estimate, f"obstacle_estimates.u{index}"))
-    for name, tool in hands(scenario.tools, scenario.seed).items():
-        if tool.hunt.speed:
-            wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))
-    known = aliases(scenario)
-    wires = [(known.get(source, source), sink) for source, sink in wires]
-    exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    wires, exports = wiring(scenario, systems)
     return finish(builder, "gauze_delivery", systems, wires, exports)

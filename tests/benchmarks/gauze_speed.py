@@ -70,7 +70,7 @@ def plant_alone(scenario: Any, run: Run) -> float:
     builder = DiagramBuilder()
     plant = add_theatre(builder, scenario).systems["plant"]
     times, rows = np.unique(run.signals["time"], return_index=True)
-    posture = run.matrix("joints.posture")[rows]
+    posture = run.joints.posture.q[rows]
     states = np.hstack([posture, np.zeros_like(posture)])
     motion = PiecewisePolynomial.FirstOrderHold(times, states.T)
     source = builder.AddSystem(TrajectorySource(motion))

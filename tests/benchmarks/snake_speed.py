@@ -125,9 +125,9 @@ def circle() -> Circle:
     """`snake_circle`, every 2 ms."""
     tip = load_scenario("snake_circle").tip
     time = np.arange(0.0, DURATION + 0.1, 2e-3)
-    poses = np.array([reference(tip, t) for t in time])
-    x = tool_postures(poses[:, :3], poses[:, 3:6], poses[:, 6:], PARAMS).x
-    return Circle(time, x, poses[:, :3])
+    p_WT, n_WT, n_WI = np.array([reference(tip, t) for t in time]).swapaxes(0, 1)
+    x = tool_postures(p_WT, n_WT, n_WI, PARAMS).x
+    return Circle(time, x, p_WT)
 
 
 @dataclass

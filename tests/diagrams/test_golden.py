@@ -5,7 +5,10 @@ import pytest
 from tests.golden import differences, figures, golden
 
 GOLDEN = golden()
-LONG = {"resect_auto_small", "resect_paper", "resect_refused", "snake_wire_break"}
+LONG = {
+    *("resect_auto_large", "resect_auto_small", "resect_paper", "resect_refused"),
+    "snake_wire_break",
+}
 """Rows that no other test needs."""
 
 

@@ -11,6 +11,7 @@ from diagrams.common.run import prepare, simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.studies import load_scenario
 from diagrams.wrist.plots import plots
+from diagrams.wrist.scenario import UNLIMITED
 from tests.runs import run
 
 
@@ -103,7 +104,7 @@ def test_bad_input(override, message):
         load_scenario("pwe_arc", [override])
 
 
-def test_modes_that_are_compared_are_run_without_a_force_limit():
+def test_modes_that_are_compared_are_run_at_the_highest_force_limit():
     scenario = load_scenario(
         "pwe_arc", ["compare=[off, known]", "measure_from=0"], duration=0.1
     )
@@ -111,7 +112,7 @@ def test_modes_that_are_compared_are_run_without_a_force_limit():
     assert list(run.case.companions) == ["off", "known"]
     for mode, beside in run.case.companions.items():
         assert beside.scenario.wrist == mode
-        assert beside.scenario.passive_wrist.force_limit == 1e3
+        assert beside.scenario.passive_wrist.force_limit == UNLIMITED
     labels = plots(run)["forces"].axes[0].get_legend().get_texts()
     assert len(labels) == 3
 
