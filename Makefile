@@ -1,15 +1,17 @@
 # make setup     the virtual environment .venv (the other targets call it)
 # make demo      runs gauze_dynamic: figures, plots and a replay in out/
-# make test      style, types and all tests
-# make bench     benchmarks, side by side (SEED=N for other scenes)
+# make test      style, types and all tests, JOBS at a time
+# make golden    the figures of all scenarios against the table of golden ones
+# make bench     benchmarks, side by side (SEED=N for other scenes, ONLY=NAME for one)
 # make notebook  opens the notebooks in Jupyter
 
 PYTHON ?= python3.12
 BIN := .venv/bin
 SEED ?= 1
+JOBS ?= 2
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: setup demo test bench notebook clean
+.PHONY: setup demo test golden bench notebook clean
 
 setup: .venv/ready
 
@@ -24,11 +26,15 @@ demo: setup
 test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest -m "not study"
+	$(BIN)/mypy & types=$$!; \
+	$(BIN)/python -m pytest -m "not study" -n $(JOBS) --dist loadgroup \
+		--no-loadscope-reorder && wait $$types
+
+golden: setup
+	$(BIN)/python -m tests.golden $(ONLY)
 
 bench: setup
-	$(BIN)/python -m tests.benchmarks --seed $(SEED)
+	$(BIN)/python -m tests.benchmarks --seed $(SEED) $(ONLY)
 
 notebook: setup
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt jupyterlab

@@ -1,4 +1,4 @@
-"""Fixtures that all tests share."""
+"""Fixtures that all tests share, and their order."""
 
 import os
 from pathlib import Path
@@ -10,6 +10,11 @@ import pytest
 
 settings.register_profile("repeatable", derandomize=True)
 settings.load_profile("repeatable")
+
+DIAGRAMS = Path(__file__).parent / "diagrams"
+
+FIRST = ("resection", "gauze", "wrist", "snake")
+"""Systems whose tests take longest and compile most kernels: they are begun with."""
 
 CHROMIUM_FLAGS = [
     "--headless",
@@ -23,6 +28,28 @@ CHROMIUM_FLAGS = [
     "--virtual-time-budget=8000",
     "--window-size=1200,800",
 ]
+
+
+def group(item: pytest.Item) -> str:
+    """What runs on one worker: all tests of a system's diagram, else those of a file.
+
+    They share runs of scenarios, and no two workers compile the same kernels.
+    """
+    marker = item.get_closest_marker("xdist_group")
+    if marker is not None:
+        return str(marker.args[0])
+    folder = item.path.parent
+    return folder.name if folder.parent == DIAGRAMS else str(item.path)
+
+
+@pytest.hookimpl(tryfirst=True)  # before the workers read the groups
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Groups the tests, and puts the long groups first."""
+    groups = {item: group(item) for item in items}
+    for item, name in groups.items():
+        item.add_marker(pytest.mark.xdist_group(name))
+    place = {name: number for number, name in enumerate(FIRST)}
+    items.sort(key=lambda item: place.get(groups[item], len(FIRST)))
 
 
 @pytest.fixture(scope="session")

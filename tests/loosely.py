@@ -1,7 +1,7 @@
 """Compiled functions called as tests like to: with lists, whole numbers, dataclasses.
 
 Every new type of an argument would compile a function anew; so numbers become what
-the blocks pass: tuples of three floats, arrays, records.
+the blocks pass: tuples of three floats, signals, arrays, records.
 """
 
 from collections.abc import Callable
@@ -23,6 +23,8 @@ def loosely(
     """
 
     def formed(value: Any) -> Any:
+        if hasattr(value, "_fields"):
+            return type(value)(*map(formed, value))
         if is_dataclass(value) and constants is not None:
             return constants(value)[0]
         if isinstance(value, list | tuple) and np.ndim(value) == 2:
@@ -31,7 +33,7 @@ def loosely(
             if len(value) <= 3:
                 return tuple(map(float, value))
             return np.array(value, float)
-        return float(value) if isinstance(value, int) else value
+        return float(value) if isinstance(value, int | np.floating) else value
 
     @wraps(function)
     def loose(*args: Any) -> Any:

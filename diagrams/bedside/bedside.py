@@ -16,6 +16,24 @@ from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
+from systems.common.parameter import parameter
+
+
+@dataclass
+class ToolAtStart:
+    """Where the robot's own tool R is at the start, in W."""
+
+    p_WG: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "its true fulcrum G_R, the wall at rest",
+        "m",
+        least=-0.5,
+        most=0.5,
+        shape=(3,),
+    )
+    p_WP: list[float] = parameter(
+        [0.0, 0.0, -0.1], "its tip", "m", least=-0.5, most=0.5, shape=(3,)
+    )
 
 
 @dataclass
@@ -80,25 +98,25 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
     return Bedside(systems, posture, instrument, abdomen)
 
 
-def stiffen(scenario: Any, station: Any, context: Any) -> None:
+def stiffen(case: Any, station: Any, context: Any) -> None:
     """Sets the trocar's stiffness for the present time: insufflation stretches it.
 
     The spring's constants are parameters of the plant, which no block may change,
     so this is done between two advances.
 
     Args:
-        scenario: Has `abdomen` and `wall_motion`.
+        case: Its scenario has `abdomen` and `wall_motion`.
         station: The study's diagram.
         context: The root diagram's context.
     """
-    motion = scenario.wall_motion
+    motion = case.scenario.wall_motion
     if motion.stiffening == 0.0:
         return
     plant = station.GetSubsystemByName("plant")
     for index in range(plant.num_force_elements()):
         element = plant.get_force_element(ForceElementIndex(index))
         if isinstance(element, LinearBushingRollPitchYaw):
-            stiffness = scenario.abdomen.stiffness * motion.stiffness_factor(
+            stiffness = case.scenario.abdomen.stiffness * motion.stiffness_factor(
                 context.get_time()
             )
             element.SetForceStiffnessConstants(

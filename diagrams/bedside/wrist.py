@@ -1,6 +1,6 @@
 """Figure 2's "passive wrist emulation control", for every diagram that has an arm."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 import logging
 from typing import Any
 
@@ -9,12 +9,19 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.bedside.bedside import Bedside
 from diagrams.common.scenario import ScenarioError
 from plants.abdomen.wall_motion import WallMotionParams
-from systems.passive_wrist.fulcrum_estimator import FulcrumEstimator, FulcrumParams
-from systems.passive_wrist.passive_wrist_emulation import (
-    PassiveWristEmulation,
-    WristParams,
+from systems.common.parameter import parameter, part
+from systems.common.signals import (
+    Fulcrum,
+    MovingPoint,
+    Permission,
+    Point,
+    ShaftMotion,
+    Wrench,
 )
-from systems.passive_wrist.wrist_law import MODES
+from systems.passive_wrist.fulcrum_estimator import Covariance, FulcrumEstimator
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
+from systems.passive_wrist.wrist_law import MODES, WristParams
 from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
 
 WRIST_WIRES = (
@@ -40,49 +47,38 @@ WRIST_EXPORTS = {
 """What can be logged of it."""
 
 WRIST_SIGNALS = {
-    "wrist.fulcrum": (
-        *("x", "y", "z", "vx", "vy", "vz", "sigma_across", "sigma_along"),
-        *("stiffness", "sigma_ln_stiffness", "rate", "phase", "jumps", "refused"),
-    ),
-    "wrist.covariance": tuple(f"{a}{b}" for a in "xyz" for b in "xyz"),
-    "wrist.pivot": ("x", "y", "z"),
-    "wrist.permission": ("speed_scale", "code"),
-    "wrist.wrench": ("fx", "fy", "fz", "mx", "my", "mz", "valid"),
-    "wrist.shaft": (
-        *("px", "py", "pz", "ux", "uy", "uz"),
-        *("vx", "vy", "vz", "dux", "duy", "duz"),
-    ),
-    "wall.fulcrum": ("x", "y", "z", "vx", "vy", "vz"),
+    "wrist.fulcrum": Fulcrum,
+    "wrist.covariance": Covariance,
+    "wrist.pivot": Point,
+    "wrist.permission": Permission,
+    "wrist.wrench": Wrench,
+    "wrist.shaft": ShaftMotion,
+    "wall.fulcrum": MovingPoint,
 }
-"""Columns of the log."""
+"""What is logged of it."""
 
 
 @dataclass
 class WristSettings:
-    """What a scenario says of the wrist and the wall.
+    """What a scenario says of the wrist and the wall."""
 
-    Attributes:
-        wrist: `pwe`, `spring`, `off` or `known`.
-        first_guess: Error of the first guess of the fulcrum, in W [m].
-    """
-
-    wrist: str = "known"
-    first_guess: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    wall_motion: WallMotionParams = field(default_factory=WallMotionParams)
-    tool_wrench: ToolWrenchParams = field(default_factory=ToolWrenchParams)
-    fulcrum_estimator: FulcrumParams = field(default_factory=FulcrumParams)
-    passive_wrist: WristParams = field(default_factory=WristParams)
+    wrist: str = parameter("known", "whose fulcrum the wrist believes", choices=MODES)
+    first_guess: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "error of the first guess of the fulcrum, in W",
+        "m",
+        least=-0.05,
+        most=0.05,
+        shape=(3,),
+    )
+    wall_motion: WallMotionParams = part(WallMotionParams)
+    tool_wrench: ToolWrenchParams = part(ToolWrenchParams)
+    fulcrum_estimator: FulcrumParams = part(FulcrumParams)
+    passive_wrist: WristParams = part(WristParams)
 
 
 def check_wrist(scenario: Any) -> None:
     """Raises ScenarioError for wrist settings that do not go together."""
-    if scenario.wrist not in MODES:
-        raise ScenarioError(f"wrist={scenario.wrist!r}: choose from {', '.join(MODES)}")
-    guess = scenario.first_guess
-    if len(guess) != 3 or not all(abs(x) <= 0.05 for x in guess):
-        raise ScenarioError(
-            f"first_guess={guess}: expected 3 numbers of at most 0.05 m"
-        )
     period = scenario.joints.period
     for name in ("tool_wrench", "fulcrum_estimator", "passive_wrist"):
         own = getattr(scenario, name).period

@@ -23,11 +23,11 @@ def settled(time: np.ndarray, value: np.ndarray, bound: float) -> float | None:
 
 def estimate_errors(run: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Estimate minus true fulcrum: 3-D, across the shaft, and normalised squared."""
-    error = run.matrix("wrist.fulcrum")[:, :3] - run.matrix("wall.fulcrum")[:, :3]
-    u = run.matrix("wrist.shaft")[:, 3:6]
+    error = run.wrist.fulcrum.p - run.wall.fulcrum.p
+    u = run.wrist.shaft.u
     along = np.einsum("ni,ni->n", error, u)
     across = error - along[:, None] * u
-    C = run.matrix("wrist.covariance").reshape(-1, 3, 3) + 1e-14 * np.eye(3)
+    C = run.wrist.covariance.P.reshape(-1, 3, 3) + 1e-14 * np.eye(3)
     squared = np.einsum("ni,ni->n", error, np.linalg.solve(C, error[..., None])[..., 0])
     return np.linalg.norm(error, axis=1), np.linalg.norm(across, axis=1), squared
 
@@ -41,13 +41,13 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
         event: Time of the wall's jump [s]; negative for none.
     """
     time = run.signals["time"]
-    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
-    off = run.signals["wall.fulcrum_error"]
+    force = np.linalg.norm(run.wall.force.f, axis=1)
+    off = run.wall.fulcrum_error.distance
     spatial, across, squared = estimate_errors(run)
     late = time >= start - 1e-9
     wrist = run.scenario.passive_wrist
-    scale = run.signals["wrist.permission.speed_scale"]
-    code = np.round(run.signals["wrist.permission.code"])
+    scale = run.wrist.permission.speed_scale
+    code = np.round(run.wrist.permission.code)
     figures: dict[str, Any] = {
         "wrist": run.scenario.wrist,
         "rms_lateral_force": rms(force[late]),
@@ -65,10 +65,10 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
         "nees_above_95": float(np.mean(squared[time > 15.0] > CHI2_95))
         if time[-1] > 16.0
         else None,
-        "stiffness_estimate": float(run.signals["wrist.fulcrum.stiffness"][-1]),
-        "breathing_rate_estimate": float(run.signals["wrist.fulcrum.rate"][-1]),
-        "jumps_followed": int(run.signals["wrist.fulcrum.jumps"][-1]),
-        "estimates_refused": int(run.signals["wrist.fulcrum.refused"][-1]),
+        "stiffness_estimate": float(run.wrist.fulcrum.stiffness[-1]),
+        "breathing_rate_estimate": float(run.wrist.fulcrum.rate[-1]),
+        "jumps_followed": int(run.wrist.fulcrum.jumps[-1]),
+        "estimates_refused": int(run.wrist.fulcrum.refused[-1]),
         "time_frozen": float(np.mean((code == 8) | (code == 9)) * time[-1]),
         "mean_speed_scale": float(scale[late].mean()) if late.any() else None,
     }

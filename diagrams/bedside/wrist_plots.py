@@ -32,12 +32,12 @@ def forces(runs: Mapping[str, Any], start: float) -> Figure:
     for order, (mode, run) in enumerate(runs.items()):
         name, color = MODES[mode]
         time = run.signals["time"]
-        force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+        force = np.linalg.norm(run.wall.force.f, axis=1)
         style = {"color": color, "lw": 1.6 if not order else 1.0, "zorder": 5 - order}
         rms = np.sqrt(np.mean(force[time >= start] ** 2))
         label = f"{name}: {rms:.2g} N rms"
         upper.semilogy(time, np.maximum(force, drawn), label=label, **style)
-        off = run.signals["wall.fulcrum_error"] * MM
+        off = run.wall.fulcrum_error.distance * MM
         lower.semilogy(time, np.maximum(off, drawn), **style)
     limits = next(iter(runs.values())).scenario.passive_wrist
     for bound, name in (
@@ -62,15 +62,15 @@ def estimate(run: Any, start: float) -> Figure:
     """True and estimated fulcrum, the error with its sigma, stiffness and rate."""
     figure = new_figure(7.0, 7.6)
     time = run.signals["time"]
-    believed, true = run.matrix("wrist.fulcrum"), run.matrix("wall.fulcrum")
+    believed, true = run.wrist.fulcrum.p, run.wall.fulcrum.p
     places = [add_axes(figure, 4, 1, row) for row in (1, 2, 3, 4)]
     colors = (COLORS["obstacle"], COLORS["target"], COLORS["robot"])
     for axis, color in enumerate(colors):
         name = "xyz"[axis]
         places[0].plot(time, true[:, axis] * MM, color=color, lw=2.4, alpha=0.35)
         places[0].plot(time, believed[:, axis] * MM, color=color, lw=1.0, label=name)
-    span = np.ptp(true[:, :3]) * MM + 4.0
-    middle = true[:, :3].mean() * MM
+    span = np.ptp(true) * MM + 4.0
+    middle = true.mean() * MM
     places[0].set(ylabel="fulcrum [mm]", ylim=(middle - span, middle + span))
     places[0].legend(
         frameon=False,
@@ -81,8 +81,8 @@ def estimate(run: Any, start: float) -> Figure:
         bbox_to_anchor=(1.0, 1.0),
     )
     spatial, across, _ = estimate_errors(run)
-    sigma_across = run.signals["wrist.fulcrum.sigma_across"] * MM
-    sigma_along = run.signals["wrist.fulcrum.sigma_along"] * MM
+    sigma_across = run.wrist.fulcrum.sigma_across * MM
+    sigma_along = run.wrist.fulcrum.sigma_along * MM
     places[1].semilogy(time, spatial * MM, color=COLORS["robot"], label="3-D error")
     places[1].semilogy(
         time,
@@ -109,7 +109,7 @@ def estimate(run: Any, start: float) -> Figure:
     places[2].semilogy(time, stiffness, color=COLORS["muted"], lw=2.4, label="true")
     places[2].semilogy(
         time,
-        run.signals["wrist.fulcrum.stiffness"],
+        run.wrist.fulcrum.stiffness,
         color=COLORS["robot"],
         label="believed",
     )
@@ -117,10 +117,10 @@ def estimate(run: Any, start: float) -> Figure:
     places[2].legend(frameon=False, ncols=2, loc="upper right")
     if any(motion.breathing):
         places[3].axhline(motion.rate, color=COLORS["muted"], lw=2.4)
-    places[3].plot(time, run.signals["wrist.fulcrum.rate"], color=COLORS["robot"])
+    places[3].plot(time, run.wrist.fulcrum.rate, color=COLORS["robot"])
     places[3].plot(
         time,
-        0.4 * run.signals["wrist.permission.speed_scale"],
+        0.4 * run.wrist.permission.speed_scale,
         color=COLORS["target"],
         lw=0.8,
         label="speed scale (1 at the top)",

@@ -5,7 +5,7 @@ from typing import Any
 from pydrake.geometry import Rgba, Sphere
 from pydrake.math import RigidTransform
 
-from diagrams.common.replay import draw_arrow
+from diagrams.common.replay import draw_arrow, thinned
 
 METRES_PER_NEWTON = 0.03
 """Scale of the replay's force arrow."""
@@ -22,7 +22,7 @@ def draw_point(
 ) -> None:
     """A ball that moves along `points` (n, 3) [m]; wider than the trocar's tube."""
     meshcat.SetObject(path, Sphere(radius), Rgba(*rgba))
-    for index in range(0, len(times), 4):
+    for index in range(0, len(times), 4 * thinned(len(times) // 4)):
         frame = animation.frame(times[index])
         animation.SetTransform(frame, path, RigidTransform(points[index]))
 
@@ -30,8 +30,8 @@ def draw_point(
 def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
     """True fulcrum (green), believed one (violet), the wall's force (orange)."""
     time = run.signals["time"]
-    true = run.matrix("wall.fulcrum")[:, :3]
-    believed = run.matrix("wrist.pivot")
+    true = run.wall.fulcrum.p
+    believed = run.wrist.pivot.p
     for path, points, radius, rgba in (
         ("true_fulcrum", true, 0.013, (0.16, 0.7, 0.3, 0.4)),
         ("believed_fulcrum", believed, 0.008, (0.6, 0.15, 0.8, 1.0)),
@@ -43,7 +43,7 @@ def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
         "wall_force",
         time,
         true,
-        run.matrix("wall.force") * METRES_PER_NEWTON,
+        run.wall.force.f * METRES_PER_NEWTON,
         (0.95, 0.6, 0.1, 1.0),
         step=4,
     )

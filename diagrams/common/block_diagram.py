@@ -6,6 +6,7 @@ from typing import Any
 import pygraphviz
 
 from diagrams.common.scenario import ScenarioError
+from systems.common.archive import whole
 
 FILLS = {"systems": "#dbe7f5", "plants": "#f6e3d3"}
 """Colour of a block by the floor of the house it comes from; Drake's own are grey."""
@@ -55,6 +56,7 @@ def draw_block_diagram(diagram: Any, path: Path) -> None:
         raise ScenarioError(f"{path}: expected a file that ends in .svg or .png")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(picture(diagram).draw(format=path.suffix[1:], prog="dot"))
+        with whole(path) as draft:
+            draft.write_bytes(picture(diagram).draw(format=path.suffix[1:], prog="dot"))
     except OSError as error:
         raise ScenarioError(f"cannot write {path}: {error.strerror}") from error

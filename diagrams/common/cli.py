@@ -7,12 +7,8 @@ from pathlib import Path
 import sys
 
 from diagrams.common.progress import progress_bar
-from diagrams.common.scenario import (
-    ScenarioError,
-    load_scenario,
-    read_tree,
-    scenario_files,
-)
+from diagrams.common.scenario import ScenarioError, scenario_files
+from diagrams.common.tree import read_tree
 
 EXAMPLES = """\
 examples:
@@ -21,6 +17,7 @@ examples:
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
+  trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
 """
 
@@ -61,6 +58,16 @@ def make_parser() -> argparse.ArgumentParser:
     draw.add_argument(
         "--out", metavar="FILE", type=Path, help="SVG or PNG; default: out/NAME.svg"
     )
+    keys = commands.add_parser(
+        "keys",
+        help="list a scenario's keys with value, unit, bounds and meaning",
+        description="Lists what `--set` can change in a scenario.",
+    )
+    keys.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    keys.add_argument(
+        "pattern", metavar="PATTERN", nargs="?", default="", help="part of the key"
+    )
+    keys.add_argument("--json", action="store_true", help="for programs")
     resect = commands.add_parser(
         "resect",
         help="plan a resection by hand, line by line",
@@ -77,12 +84,13 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def list_scenarios() -> None:
-    """Prints every scenario's name and description."""
+def list_scenarios(arguments: argparse.Namespace) -> int:
+    """Runs `trocar scenarios`: every scenario's name and description."""
     files = scenario_files()
     width = max(map(len, files), default=0)
     for name, path in files.items():
         print(f"{name:<{width}}  {read_tree(path).get('description', '')}")
+    return 0
 
 
 def default_name(name: str) -> str:
@@ -97,19 +105,22 @@ def run_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar run`."""
     from diagrams.common.metrics import table
     from diagrams.common.run import run_scenario
+    from diagrams.studies import load_scenario
 
     scenario = load_scenario(
         arguments.name, arguments.overrides, arguments.seed, arguments.duration
     )
     out = arguments.out or Path("out") / default_name(arguments.name)
-    with progress_bar("running", "simulated s") as progress:
-        run = run_scenario(scenario, out, not arguments.no_replay, progress)
+    run = run_scenario(scenario, out, not arguments.no_replay, progress_bar)
     if run.metrics:
         print(table(run.metrics))
-    replay = "replay.html, " if not arguments.no_replay else ""
-    print(f"\n{replay}metrics.json, signals.csv, scenario.yaml and plots: {out}/")
+    print(f"\n{', '.join(sorted(path.name for path in out.glob('[!.]*.*')))}: {out}/")
     if run.error:
-        print(f"trocar: the run ended early at {run.simulated:.3f} s: {run.error}")
+        end = f"ended early at {run.simulated:.3f} s"
+        print(
+            f"trocar: the run {'failed' if run.is_over else end}: {run.error}",
+            file=sys.stderr,
+        )
         return 1
     return 0
 
@@ -117,7 +128,7 @@ def run_command(arguments: argparse.Namespace) -> int:
 def diagram_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar diagram`."""
     from diagrams.common.block_diagram import draw_block_diagram
-    from diagrams.common.study import build
+    from diagrams.studies import build, load_scenario
 
     scenario = load_scenario(arguments.name)
     out = arguments.out or Path("out") / f"{default_name(arguments.name)}.svg"
@@ -126,9 +137,20 @@ def diagram_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def keys_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar keys`."""
+    from diagrams.common.keys import as_json, as_text, matching
+    from diagrams.studies import load_scenario
+
+    found = matching(load_scenario(arguments.name), arguments.pattern)
+    print(as_json(found) if arguments.json else as_text(found))
+    return 0
+
+
 def resect_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar resect`."""
     from diagrams.resection.console import run_console
+    from diagrams.studies import load_scenario
 
     scenario = load_scenario(arguments.name, arguments.overrides)
     if scenario.system != "resection":
@@ -137,6 +159,15 @@ def resect_command(arguments: argparse.Namespace) -> int:
     file = arguments.session or Path("out") / f"{name}.session"
     run_console(scenario, file, sys.stdin, sys.stdin.isatty())
     return 0
+
+
+COMMANDS = {
+    "scenarios": list_scenarios,
+    "run": run_command,
+    "diagram": diagram_command,
+    "keys": keys_command,
+    "resect": resect_command,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -149,14 +180,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("drake").setLevel(logging.WARNING)
     arguments = make_parser().parse_args(argv)
     try:
-        if arguments.command == "run":
-            return run_command(arguments)
-        if arguments.command == "diagram":
-            return diagram_command(arguments)
-        if arguments.command == "resect":
-            return resect_command(arguments)
-        list_scenarios()
-        return 0
+        return COMMANDS[arguments.command](arguments)
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
         return 2

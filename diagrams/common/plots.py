@@ -73,9 +73,9 @@ def equal_axes(
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Writes a figure as PNG."""
+    """Writes a figure as PNG, whatever the file is called."""
     with rc_context(STYLE):
-        figure.savefig(path, dpi=140)
+        figure.savefig(path, format="png", dpi=140)
 
 
 def png(figure: Figure) -> bytes:

@@ -2,6 +2,7 @@
 
 import itertools
 import logging
+import math
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,23 @@ QUERY_PORT = "scene_graph.query"
 """The exported port of a study's diagram that Meshcat draws."""
 
 
-def start_meshcat() -> Any:
-    """Starts a Meshcat server, without its log line."""
+MOST_FRAMES = 4000
+"""Of a replay: a longer one has fewer a second. A frame has about 2.3 kB."""
+
+
+def start_meshcat(host: str = "localhost") -> Any:
+    """Starts a Meshcat server, without its log line.
+
+    Args:
+        host: Where it listens: on this machine alone; "*" for all that reach it.
+    """
     logging.getLogger("drake").setLevel(logging.WARNING)
-    return Meshcat(MeshcatParams(show_stats_plot=False))
+    return Meshcat(MeshcatParams(host=host, show_stats_plot=False))
+
+
+def thinned(count: int) -> int:
+    """Of so many frames, every which is drawn."""
+    return math.ceil(count / MOST_FRAMES)
 
 
 class Recorder:
@@ -56,10 +70,12 @@ class Recorder:
         if self._meshcat is None:
             return
         self._meshcat.StopRecording()
-        if run.metrics:
-            animation = self._meshcat.get_mutable_recording()
-            self._study.decorate(self._meshcat, animation, run)
-        self._meshcat.PublishRecording()
+        try:
+            if run.metrics:
+                animation = self._meshcat.get_mutable_recording()
+                self._study.decorate(self._meshcat, animation, run)
+        finally:
+            self._meshcat.PublishRecording()
 
 
 def add_recorder(
@@ -163,7 +179,7 @@ def draw_arrow(
     meshcat.SetObject(head, MeshcatCone(0.25, 2.6 * radius, 2.6 * radius), color)
     tip = RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0.0, 0.0, 1.0])
     meshcat.SetTransform(head, tip)
-    for index in range(0, len(times), step):
+    for index in range(0, len(times), step * thinned(len(times) // step)):
         length = float(np.linalg.norm(vectors[index]))
         if length > 1e-9:
             R_WA = RotationMatrix.MakeFromOneVector(vectors[index], 2)

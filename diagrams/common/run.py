@@ -1,7 +1,7 @@
-"""Running a scenario: build, advance, log; then measure, plot and replay."""
+"""Running a scenario: prepare, build, advance, log; then measure, plot and replay."""
 
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 import gc
 import json
@@ -18,41 +18,57 @@ from pydrake.systems.analysis import (
     SimulatorConfig,
 )
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from diagrams.common import metrics, replay
+from diagrams.common.case import Case
+from diagrams.common.log import (
+    add_log,
+    columns,
+    first_fault,
+    named,
+    read_log,
+    save_signals,
+)
 from diagrams.common.plots import save_figure
-from diagrams.common.scenario import ScenarioError, check_scenario, save_scenario
-from diagrams.common.study import Study, build, get_study
-from systems.common.compiled import announced
+from diagrams.common.progress import Progress, Show, progress_of, silent
+from diagrams.common.results import Results, results, save_scenario
+from diagrams.common.scenario import ScenarioError, refusals
+from diagrams.common.study import Study
+from diagrams.studies import build, check_scenario, get_study
+from systems.common.compiled import rehearse
 from systems.common.stopwatch import STOPWATCH
 
-Progress = Callable[[float, float], None]
-"""Called with simulated seconds: those done and all."""
+INTERRUPTED = "interrupted"
+"""Error of a run that was interrupted."""
+
+LARGEST_LOG = 2e9
+"""Of a run, in bytes."""
 
 
 @dataclass
 class Run:
-    """A run of a scenario: what was simulated and what was logged.
+    """A run of a case: what was simulated and what was logged.
 
     Attributes:
-        scenario: What ran.
+        case: What ran.
         study: The system that ran it.
         diagram: The root diagram; the study's own is its subsystem "station".
+        logged: Ports that were logged, and their signals.
         signals: Column name to samples; "time" [s] is the common clock.
         wall_time: Wall seconds of the advance alone.
         simulated: Simulated seconds reached.
         instants: Wall seconds of all blocks, one for every whole control instant.
         updates: Median wall seconds of one update, by block.
-        error: Why the run ended early, or "".
+        error: Why the run ended early or failed, or "".
         duration: Simulated seconds that the whole run takes.
         replay_speed: Simulated seconds that a second of the replay shows.
         metrics: The figures, once measured.
     """
 
-    scenario: Any
+    case: Case
     study: Study
     diagram: Any
+    logged: dict[str, Any] = field(default_factory=dict)
     signals: dict[str, np.ndarray] = field(default_factory=dict)
     wall_time: float = 0.0
     simulated: float = 0.0
@@ -63,41 +79,72 @@ class Run:
     replay_speed: float = 1.0
     metrics: dict[str, Any] = field(default_factory=dict)
 
-    def matrix(self, name: str) -> np.ndarray:
-        """All columns of one port, shape (samples, columns)."""
-        return np.column_stack([self.signals[c] for c in columns(self.study, name)])
+    @property
+    def scenario(self) -> Any:
+        """What ran, as it was written."""
+        return self.case.scenario
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the whole of it was simulated."""
+        return self.simulated >= self.duration > 0.0
+
+    def __getattr__(self, name: str) -> Any:
+        """What was logged below a name: `run.planner.guide.rho` is an array (n)."""
+        if name.startswith("_"):  # asked for by who copies it
+            raise AttributeError(name)
+        return named(self.logged, self.signals, name)
 
 
-def columns(study: Study, port: str) -> list[str]:
-    """Names of a port's columns in the log."""
-    parts = study.signals[port]
-    return [f"{port}.{part}" for part in parts] if len(parts) > 1 else [port]
-
-
-def rehearse(
-    diagram: Any, context: Any, config: SimulatorConfig, duration: float
-) -> None:
-    """Runs the first instants on a copy of the context, and forgets them.
-
-    The blocks' kernels are compiled at their first call, or loaded from the disk: that
-    is no part of the time that a run takes. An error will come again in the run.
+@contextmanager
+def survived(run: Run, what: str = "") -> Iterator[None]:
+    """What fails or is interrupted in this context does not take the run with it.
 
     Args:
-        diagram: The root diagram.
-        context: At the start of the run.
-        config: The run's integrator.
-        duration: How far to go, in s.
+        run: Its `error` says why, if there is none yet.
+        what: Is being done, for the message.
     """
-    simulator = Simulator(diagram, context.Clone())
+    try:
+        yield
+    except KeyboardInterrupt:
+        run.error = run.error or what + INTERRUPTED
+    except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
+        run.error = run.error or f"{what}{type(error).__name__}: {error}"
+
+
+def start(diagram: Any, config: SimulatorConfig, context: Any = None) -> Simulator:
+    """A simulator of a diagram at the start of a run, with the run's integrator."""
+    simulator = Simulator(diagram, context)
     ApplySimulatorConfig(config, simulator)
-    with announced(), suppress(Exception, SystemExit):
-        simulator.AdvanceTo(duration)
+    return simulator
+
+
+def prepare(scenario: Any, progress: Progress = silent) -> Case:
+    """Does all that must be done before a scenario runs: its plan, its companions.
+
+    Args:
+        scenario: A study's scenario.
+        progress: Shows how far it is, e.g. `progress_bar`.
+
+    Raises:
+        ScenarioError: If the scenario, or one beside it, cannot run.
+    """
+    check_scenario(scenario)
+    study = get_study(scenario.system)
+    with refusals():
+        case = study.prepare(scenario, progress)
+    for name, other in study.companions(scenario).items():
+        beside = simulate(other, progress=progress_of(name, progress))
+        if beside.error.endswith(INTERRUPTED):
+            raise KeyboardInterrupt
+        case.companions[name] = beside
+    return case
 
 
 def simulate(
     scenario: Any,
     meshcat: Any = None,
-    progress: Progress = lambda time, duration: None,
+    progress: Progress = silent,
 ) -> Run:
     """Runs a scenario and returns its log; raises nothing that a run can survive.
 
@@ -105,71 +152,93 @@ def simulate(
     is kept and `Run.error` says why.
 
     Args:
-        scenario: A study's scenario.
+        scenario: A study's scenario, or a case of one (see `prepare`).
         meshcat: Records into this Meshcat if given. Frames are drawn between the
             timed advances, so that they do not count as simulation time.
-        progress: Called after every frame with the simulated time and that of the
-            whole run [s].
+        progress: Shows how far it is, e.g. `progress_bar`.
 
     Raises:
         ScenarioError: If the scenario cannot run.
     """
-    check_scenario(scenario)
-    return simulate_diagram(scenario, build(scenario), meshcat, progress)
+    case = scenario if isinstance(scenario, Case) else prepare(scenario, progress)
+    return simulate_diagram(case, build(case), meshcat, progress)
 
 
 def simulate_diagram(
     scenario: Any,
     diagram: Any,
     meshcat: Any = None,
-    progress: Progress = lambda time, duration: None,
+    progress: Progress = silent,
+    save: Callable[[Run], None] = lambda run: None,
 ) -> Run:
     """Runs a diagram of one's own making, for example with swapped blocks.
 
     Args:
-        scenario: The scenario that it was made for.
+        scenario: The scenario that it was made for, or a case of it.
         diagram: Exports the ports that the scenario's study logs.
         meshcat: As for `simulate`.
         progress: As for `simulate`.
+        save: Called once there is all that was logged, before it is measured.
+
+    Raises:
+        ScenarioError: If the log would be too large.
     """
-    study = get_study(scenario.system)
+    case = scenario if isinstance(scenario, Case) else prepare(scenario, progress)
+    study = get_study(case.scenario.system)
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", diagram)
-    ports = logged_ports(station, study)
-    sink = add_log(builder, station, ports, study.log_period)
-    duration = study.length(scenario)
+    logged = study.signals(case.scenario)
+    duration = study.length(case)
+    check_log(logged, duration, study.log_period)
+    sink = add_log(builder, station, logged, study.log_period)
     speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)
     root = builder.Build()
-    simulator = Simulator(root)
-    config = study.integrator(scenario)
-    ApplySimulatorConfig(config, simulator)
+    config = study.integrator(case.scenario)
+    simulator = start(root, config)
     context = simulator.get_mutable_context()
-    root.SetRandomContext(context, RandomGenerator(scenario.seed))
-    run = Run(scenario, study, root, duration=duration, replay_speed=speed)
-    rehearse(root, context, config, 1.5 * study.log_period)
+    root.SetRandomContext(context, RandomGenerator(case.scenario.seed))
+    run = Run(case, study, root, logged, duration=duration, replay_speed=speed)
+    first = start(root, config, context.Clone())
+    rehearse(lambda: first.AdvanceTo(1.5 * study.log_period))
     STOPWATCH.reset()
     gc.disable()  # nothing in a run makes cycles, and the collector costs 5 %
     try:
-        advance(run, simulator, recorder, progress)
-    except KeyboardInterrupt:
-        run.error = "interrupted"
-    except (Exception, SystemExit) as error:  # Drake ends some errors in SystemExit
-        run.error = f"{type(error).__name__}: {error}"
+        with survived(run), progress("running", "simulated s") as show:
+            advance(run, simulator, recorder, show)
     finally:
         gc.enable()
     run.simulated = context.get_time()
-    try:
-        study.keep(scenario, station, context, True)
-    except OSError as error:
-        run.error = run.error or f"what was done could not be saved: {error}"
-    run.signals = read_log(sink, study, ports, context)
+    with survived(run, "what was done could not be saved: "):
+        study.keep(case, station, context, True)
+    run.signals = read_log(sink, logged, context)
     run.instants = STOPWATCH.whole_instants(study.controller)
     run.updates = STOPWATCH.per_block()
+    run.error = run.error or first_fault(run.signals)
+    with survived(run, "signals could not be saved: "):
+        save(run)
     if len(run.signals["time"]) > 1:
-        run.metrics = metrics.common(run) | study.measure(run)
-    recorder.finish(run)
+        with survived(run, "figures could not be measured: "):
+            run.metrics = study.measure(run)
+        run.metrics = metrics.common(run) | run.metrics
+    with survived(run, "replay could not be drawn: "):
+        recorder.finish(run)
     return run
+
+
+def check_log(logged: Mapping[str, Any], duration: float, period: float) -> None:
+    """Refuses a run whose log would not fit into memory, before it is asked for.
+
+    Raises:
+        ScenarioError: The longest duration that fits is named.
+    """
+    width = 1 + sum(len(columns(port, kind)) for port, kind in logged.items())
+    longest = LARGEST_LOG / (8 * width) * period
+    if duration > longest:
+        raise ScenarioError(
+            f"duration={duration:.6g} s: expected <= {longest:.6g}; the log of {width} "
+            f"columns every {period:.3g} s takes {LARGEST_LOG / 1e9:.3g} GB then"
+        )
 
 
 def replay_speed(study: Study, duration: float) -> float:
@@ -188,10 +257,11 @@ def advance(
     run: Run,
     simulator: Any,
     recorder: replay.Recorder,
-    progress: Progress,
+    show: Show,
 ) -> None:
     """Steps the simulator from frame to frame; only the steps are timed."""
     duration, period = run.duration, run.replay_speed / run.study.frame_rate
+    every = replay.thinned(math.ceil(duration / period))
     simulator.Initialize()
     recorder.draw(simulator.get_context())
     station = run.diagram.GetSubsystemByName("station")
@@ -199,99 +269,63 @@ def advance(
     while time < duration:
         frame += 1
         time = min(frame * period, duration)
-        run.study.adjust(run.scenario, station, simulator.get_mutable_context())
+        run.study.adjust(run.case, station, simulator.get_mutable_context())
         start = perf_counter()
         simulator.AdvanceTo(time)
         run.wall_time += perf_counter() - start
-        recorder.draw(simulator.get_context())
-        progress(time, duration)
-        run.study.keep(run.scenario, station, simulator.get_context(), False)
-
-
-def logged_ports(station: Any, study: Study) -> list[str]:
-    """The study's signals, without the optional ones that this diagram lacks."""
-    return [
-        name
-        for name in study.signals
-        if name not in study.optional or station.HasOutputPort(name)
-    ]
-
-
-def add_log(builder: Any, station: Any, names: list[str], period: float) -> Any:
-    """Logs signals of a diagram, one below the other, in one sink.
-
-    One sink for all: each system of a diagram costs time at each of its steps.
-    """
-    ports = [station.GetOutputPort(name) for name in names]
-    bundle = builder.AddNamedSystem(
-        "signals", Multiplexer([port.size() for port in ports])
-    )
-    for index, port in enumerate(ports):
-        builder.Connect(port, bundle.get_input_port(index))
-    sink = LogVectorOutput(bundle.get_output_port(), builder, period)
-    sink.set_name("log")
-    return sink
-
-
-def read_log(
-    sink: Any, study: Study, ports: list[str], context: Any
-) -> dict[str, np.ndarray]:
-    """All columns of the log; "time" is the first."""
-    log = sink.FindLog(context)
-    names = [name for port in ports for name in columns(study, port)]
-    signals = {"time": log.sample_times().copy()}
-    for name, row in zip(names, log.data(), strict=True):
-        signals[name] = row.copy()
-    return signals
-
-
-def prepare_folder(out: Path) -> None:
-    """Makes the output folder, or raises a ScenarioError if it cannot be written."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        probe = out / ".writable"
-        probe.write_text("")
-        probe.unlink()
-    except OSError as error:
-        raise ScenarioError(
-            f"cannot write to the output folder {str(out)!r}: {error.strerror}"
-        ) from error
-
-
-def save_signals(run: Run, path: Path) -> None:
-    """Writes the log as CSV, one column a signal: `pandas.read_csv(path)`."""
-    names = list(run.signals)
-    table = np.column_stack([run.signals[name] for name in names])
-    np.savetxt(
-        path, table, fmt="%.9g", delimiter=",", header=",".join(names), comments=""
-    )
+        if frame % every == 0 or time == duration:
+            recorder.draw(simulator.get_context())
+        show(time, duration)
+        run.study.keep(run.case, station, simulator.get_context(), False)
 
 
 def run_scenario(
     scenario: Any,
     out: Path,
     with_replay: bool = True,
-    progress: Progress = lambda time, duration: None,
+    progress: Progress = silent,
 ) -> Run:
     """Runs a scenario and writes all its results into a folder.
 
-    Writes `scenario.yaml`, `signals.csv`, `metrics.json`, the plots as PNG and
-    `replay.html`, in this order, so that nothing computed is lost if a later
-    one fails.
+    Writes `scenario.yaml` with the files that it names, `signals.csv`,
+    `metrics.json`, the plots as PNG and `replay.html`, in this order, so that nothing
+    computed is lost if a later one fails. What an earlier run left there stays until
+    this one begins, and then goes.
 
     Raises:
-        ScenarioError: If the scenario cannot run or the folder not be written.
+        ScenarioError: If the scenario cannot run, the folder not be written, or
+            another run writes to it.
     """
-    prepare_folder(out)
     check_scenario(scenario)
-    meshcat = replay.start_meshcat() if with_replay else None
-    save_scenario(scenario, out)
-    run = simulate(scenario, meshcat, progress)
-    save_signals(run, out / "signals.csv")
-    (out / "metrics.json").write_text(json.dumps(run.metrics, indent=2) + "\n")
-    if run.metrics:
-        for name, figure in run.study.plots(run).items():
-            save_figure(figure, out / f"{name}.png")
-    if meshcat is not None:
-        (out / "replay.html").write_text(meshcat.StaticHtml())
+    with results(out) as into:
+        case = prepare(scenario, progress)
+        diagram = build(case)
+        meshcat = replay.start_meshcat() if with_replay else None
+        try:
+            save_scenario(scenario, into)
+        except OSError as error:
+            raise ScenarioError(f"cannot write to {str(out)!r}: {error}") from error
+
+        def save(run: Run) -> None:
+            with into.file("signals.csv") as draft:
+                save_signals(run.signals, draft)
+
+        run = simulate_diagram(case, diagram, meshcat, progress, save)
+        with survived(run, "results could not be saved: "):
+            write(run, into)
+            if meshcat is not None:
+                with into.file("replay.html") as draft:
+                    draft.write_text(meshcat.StaticHtml())
     return run
+
+
+def write(run: Run, into: Results) -> None:
+    """Writes a run's figures and plots."""
+    with into.file("metrics.json") as draft:
+        draft.write_text(json.dumps(run.metrics, indent=2) + "\n")
+    figures = {}
+    with survived(run, "plots could not be drawn: "):
+        figures = run.study.plots(run) if run.metrics else {}
+    for name, figure in figures.items():
+        with into.file(f"{name}.png") as draft:
+            save_figure(figure, draft)

@@ -2,22 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-import importlib
 import math
 from typing import Any
 
 from pydrake.systems.analysis import SimulatorConfig
 
-from diagrams.common.scenario import Scenario, ScenarioError, nearest
-
-STUDIES = {
-    "gauze": "diagrams.gauze.study",
-    "navigation": "diagrams.navigation.study",
-    "wrist": "diagrams.wrist.study",
-    "snake": "diagrams.snake.study",
-    "resection": "diagrams.resection.study",
-}
-"""A scenario's `system` and the module whose `STUDY` runs it."""
+from diagrams.common.case import Case
+from diagrams.common.progress import Progress
+from diagrams.common.scenario import Scenario
 
 
 def cenic(longest_step: float = 0.01) -> SimulatorConfig:
@@ -43,17 +35,18 @@ class View:
 class Study:
     """One system that scenarios can run.
 
+    What is planned or simulated for a run is done before it, by `prepare` and as
+    `companions`: all the rest is handed the case, or a run that has it.
+
     Attributes:
-        name: Its key in `STUDIES`.
+        name: What scenarios call it, their `system`.
         scenario: The scenario's dataclass.
-        make_diagram: Makes the diagram of a scenario. Exported vector ports named
+        make_diagram: Makes the diagram of a case. Exported vector ports named
             `model.signal` can be logged; an exported port `scene_graph.query`
             is shown in Meshcat.
         check: Raises ScenarioError for a scenario that cannot run.
         measure: The figures of a finished run, flat and in SI units.
-        signals: Exported ports to log: port name to column names. A
-            one-element port's column is the port's name itself.
-        optional: Those of the signals that only some scenarios' diagrams export.
+        signals: Exported ports to log for a scenario, and their signals.
         log_period: Period of the log [s], on the control clock.
         plots: Makes the figures of a run, by file name without ending.
         decorate: Adds trails, arrows and the like to a recording.
@@ -62,13 +55,18 @@ class Study:
         required: Dotted keys that a scenario's file must have.
         integrator: Makes the SimulatorConfig of a scenario.
         view: The replay's camera.
-        adjust: Called with scenario, diagram and root context before every frame,
+        adjust: Called with case, diagram and root context before every frame,
             for parameters of the plant that change with time.
-        keep: Called with scenario, diagram, root context and whether the run has
+        keep: Called with case, diagram, root context and whether the run has
             ended, after every frame: saves what must not be lost if it is killed.
         frame_rate: Frames of the replay per second of it [1/s].
-        length: How long a scenario really runs [s], at most its duration.
+        length: How long a case really runs [s], at most its scenario's duration.
         replay_length: A run longer than this [s] is shown faster.
+        prepare: Makes the case of a scenario, and shows the progress of it.
+        outline: Makes a case that is not prepared: its diagram has the same blocks
+            and wires, and is there at once.
+        gather: Puts plain data of a scenario into the form of its dataclass, in place.
+        companions: Scenarios to run beside one, by name; those have none.
     """
 
     name: str
@@ -76,42 +74,20 @@ class Study:
     make_diagram: Callable[[Any], Any]
     check: Callable[[Any], None]
     measure: Callable[[Any], dict[str, Any]]
-    signals: dict[str, tuple[str, ...]]
+    signals: Callable[[Any], dict[str, Any]]
     log_period: float
     plots: Callable[[Any], dict[str, Any]]
     decorate: Callable[[Any, Any, Any], None] = lambda meshcat, animation, run: None
     controller: str = ""
-    optional: frozenset[str] = frozenset()
-    adjust: Callable[[Any, Any, Any], None] = lambda scenario, station, context: None
+    adjust: Callable[[Any, Any, Any], None] = lambda case, station, context: None
     keep: Callable[[Any, Any, Any, bool], None] = lambda *now: None
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], SimulatorConfig] = lambda scenario: cenic()
     view: View = field(default_factory=View)
     frame_rate: float = 30.0
-    length: Callable[[Any], float] = lambda scenario: scenario.duration
+    length: Callable[[Any], float] = lambda case: case.scenario.duration
     replay_length: float = math.inf
-
-
-def build(scenario: Any) -> Any:
-    """Makes a scenario's diagram.
-
-    Raises:
-        ScenarioError: If a block or a plant refuses one of its parameters.
-    """
-    try:
-        return get_study(scenario.system).make_diagram(scenario)
-    except ScenarioError:
-        raise
-    except ValueError as error:
-        raise ScenarioError(str(error)) from error
-
-
-def get_study(name: Any) -> Study:
-    """The study of a name.
-
-    Raises:
-        ScenarioError: If there is none; the nearest name is in the message.
-    """
-    if name not in STUDIES:
-        raise ScenarioError(f"system={name!r}: {nearest(str(name), STUDIES)}")
-    return importlib.import_module(STUDIES[name]).STUDY
+    prepare: Callable[[Any, Progress], Case] = lambda scenario, progress: Case(scenario)
+    outline: Callable[[Any], Case] = Case
+    gather: Callable[[dict[str, Any]], None] = lambda tree: None
+    companions: Callable[[Any], dict[str, Any]] = lambda scenario: {}

@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from diagrams.common.plots import COLORS, add_axes, new_figure
+from diagrams.gauze.tools import CAMERA, OBSTACLE, TARGET, gap, logged
 
 MM = 1e3
 
@@ -15,31 +16,26 @@ def clearance(run: Any) -> Figure:
     figure = new_figure(7.0, 5.2)
     time = run.signals["time"]
     upper = add_axes(figure, 2, 1, 1)
-    gaps = run.matrix("clearance") * MM
-    for column, who, name in (
-        (0, "obstacle", "O"),
-        (1, "target", "S (touched at the hand-over)"),
-        (2, "camera", "endoscope"),
+    for who, name in (
+        (OBSTACLE, "O"),
+        (TARGET, "S (touched at the hand-over)"),
+        (CAMERA, "endoscope"),
     ):
-        upper.plot(time, gaps[:, column], color=COLORS[who], label=name)
+        upper.plot(time, gap(run, who) * MM, color=COLORS[who], label=name)
     upper.axhline(0.0, color="k", lw=0.8)
     upper.set(ylabel="clearance [mm]", ylim=(-6.0, 40.0), xlim=(time[0], time[-1]))
     upper.legend(ncols=3, loc="upper right")
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
-    status = run.matrix("planner.clearance")
-    lower.plot(time, status[:, 4] * MM, color=COLORS["robot"], label="changed by")
-    marks = [("dodging", status[:, 3] > 0.5, COLORS["accent"])]
-    marks.append(
-        (
-            "evasion condition fails",
-            (status[:, 1] > 0.5) & (status[:, 2] < 0.5),
-            COLORS["obstacle"],
-        )
-    )
-    if "planner.way.waiting" in run.signals:
-        way = run.matrix("planner.way")
-        marks.append(("waiting", way[:, 1] > 0.5, COLORS["muted"]))
-    top = max(10.0, 1.05 * float(status[:, 4].max()) * MM)
+    status = run.planner.clearance
+    lower.plot(time, status.change * MM, color=COLORS["robot"], label="changed by")
+    fails = (status.near > 0.5) & (status.condition < 0.5)
+    marks = [
+        ("dodging", status.dodge > 0.5, COLORS["accent"]),
+        ("evasion condition fails", fails, COLORS["obstacle"]),
+    ]
+    if "planner.way" in run.logged:
+        marks.append(("waiting", run.planner.way.waiting > 0.5, COLORS["muted"]))
+    top = max(10.0, 1.05 * float(status.change.max()) * MM)
     for name, flags, color in marks:
         lower.fill_between(
             time, 0.0, top, where=flags, color=color, alpha=0.3, lw=0, label=name
@@ -61,22 +57,23 @@ def forms(runs: dict[str, Any]) -> Figure:
     colors = [COLORS["robot"], COLORS["accent"], COLORS["muted"], COLORS["camera"]]
     first = next(iter(runs.values()))
     ends = []
-    for who, label in (("obstacle", "O"), ("target", "S")):
-        fulcrum = np.array(getattr(first.scenario, who).p_WG) * MM
-        tip = first.matrix(f"{who}.shaft")[-1, :3] * MM
-        axes.plot(*np.column_stack([fulcrum, tip]), color=COLORS[who], lw=4)
-        axes.text(*tip, f"  {label}", color=COLORS[who])
+    scene = first.scenario
+    for tool in [*scene.obstacles, scene.target]:
+        fulcrum = np.array(tool.p_WG) * MM
+        tip = logged(first, tool).shaft.tip[-1] * MM
+        axes.plot(*np.column_stack([fulcrum, tip]), color=COLORS[tool.role], lw=4)
+        axes.text(
+            *tip, "  S" if tool.role == TARGET else "  O", color=COLORS[tool.role]
+        )
         ends += [fulcrum, tip]
     for (name, run), color in zip(runs.items(), colors, strict=False):
-        tool = run.matrix("robot.tool") * MM
-        axes.plot(*tool[:, 3:].T, color=color, lw=2.2, label=name)
-        axes.plot(*tool[-1:, 3:].T, "o", color=color, ms=6)
-        axes.plot(*np.stack([tool[-1, :3], tool[-1, 3:]]).T, color=color, lw=1, ls=":")
-        left = np.linalg.norm(
-            tool[:, 3:] - run.matrix("target.shaft")[:, :3] * MM, axis=1
-        )
+        tip, p_WG = run.robot.tool.tip * MM, run.robot.tool.fulcrum * MM
+        axes.plot(*tip.T, color=color, lw=2.2, label=name)
+        axes.plot(*tip[-1:].T, "o", color=color, ms=6)
+        axes.plot(*np.stack([p_WG[-1], tip[-1]]).T, color=color, lw=1, ls=":")
+        left = np.linalg.norm(tip - logged(run, scene.target).shaft.tip * MM, axis=1)
         beside.plot(run.signals["time"], left, color=color, label=name)
-        ends += [tool[0, :3], *tool[::10, 3:]]
+        ends += [p_WG[0], *tip[::10]]
     points = np.array(ends)
     low, high = points.min(axis=0), points.max(axis=0)
     middle, half = (low + high) / 2.0, (high - low).max() / 2.0

@@ -6,12 +6,17 @@ from typing import Any
 
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, RandomSource
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Multiplexer,
+    RandomSource,
+)
 
 from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
+from diagrams.gauze.tools import OBSTACLE, HandTool, hands
 from plants.surgeon.hunting_tool import HuntingTool
 from plants.surgeon.surgeon_tool import SurgeonTool
 from systems.auto_guidance.backward_movement import BackwardMovement
@@ -20,6 +25,8 @@ from systems.auto_guidance.go_to_target import GoToTarget
 from systems.auto_guidance.velocity_corrections import VelocityCorrections
 from systems.bypass.clearance_constraint import ClearanceConstraint
 from systems.bypass.tool_bypass import ToolBypass
+from systems.common.signal import size
+from systems.common.signals import Estimate
 from systems.motion.endoscope import Endoscope
 from systems.motion.joint_commands import JointCommands
 from systems.motion.tool_navigation import ToolNavigation
@@ -28,56 +35,72 @@ from systems.sensing.robot_location import RobotLocation
 from systems.sensing.trajectory_estimator import TrajectoryEstimator
 
 WIRES = (
-    # The surgeon's tools are seen by the tracker; estimators make sense of it.
-    ("target_tool.shaft", "optical_tracker.S"),
-    ("obstacle_tool.shaft", "optical_tracker.O"),
-    ("tracker_noise.output", "optical_tracker.noise"),
-    ("optical_tracker.S_measured", "target_estimator.measurement"),
-    ("optical_tracker.O_measured", "obstacle_estimator.measurement"),
     # The camera follows S and gives the view cone.
-    ("target_estimator.estimate", "endoscope.target"),
+    ("target.estimate", "endoscope.target"),
     # Figure 2's feedback: where the robot's tool is.
     ("plant.pa10_state", "robot_location.arm_state"),
     ("fulcrum.y0", "robot_location.fulcrum"),
     # Figure 4, the local planner: three behaviours and the fuzzy decision.
     ("robot_location.robot_tool", "go_to_target.robot_tool"),
-    ("obstacle_estimator.estimate", "go_to_target.obstacle"),
-    ("target_estimator.estimate", "go_to_target.target"),
+    ("obstacles.estimates", "go_to_target.obstacles"),
+    ("target.estimate", "go_to_target.target"),
     ("go_to_target.v1", "velocity_corrections.v1"),
     ("go_to_target.guide", "velocity_corrections.guide"),
-    ("obstacle_estimator.estimate", "velocity_corrections.obstacle"),
+    ("obstacles.estimates", "velocity_corrections.obstacles"),
     ("go_to_target.guide", "backward_movement.guide"),
-    ("obstacle_estimator.estimate", "backward_movement.obstacle"),
+    ("obstacles.estimates", "backward_movement.obstacles"),
     ("go_to_target.v1", "fuzzy_arbiter.v1"),
     ("velocity_corrections.v2", "fuzzy_arbiter.v2"),
     ("backward_movement.v3", "fuzzy_arbiter.v3"),
     ("go_to_target.guide", "fuzzy_arbiter.guide"),
     ("robot_location.robot_tool", "fuzzy_arbiter.robot_tool"),
-    ("obstacle_estimator.estimate", "fuzzy_arbiter.obstacle"),
-    ("target_estimator.estimate", "fuzzy_arbiter.target"),
-    # The hard clearance to O, to S's own shaft and to the endoscope.
+    ("obstacles.estimates", "fuzzy_arbiter.obstacles"),
+    ("target.estimate", "fuzzy_arbiter.target"),
+    # The hard clearance to the obstacles, to S's own shaft and to the endoscope.
     ("fuzzy_arbiter.v_R", "clearance_constraint.v_R"),
     ("go_to_target.guide", "clearance_constraint.guide"),
     ("robot_location.robot_tool", "clearance_constraint.robot_tool"),
-    ("obstacle_estimator.estimate", "clearance_constraint.obstacle"),
-    ("target_estimator.estimate", "clearance_constraint.target"),
+    ("obstacles.estimates", "clearance_constraint.obstacles"),
+    ("target.estimate", "clearance_constraint.target"),
     ("endoscope.estimate", "clearance_constraint.camera"),
     ("endoscope.view_cone", "clearance_constraint.view_cone"),
     # The guide point's velocity becomes tool motion, then joint motion.
     ("clearance_constraint.v_safe", "tool_navigation.v_R"),
     ("go_to_target.guide", "tool_navigation.guide"),
     ("robot_location.robot_tool", "tool_navigation.robot_tool"),
-    ("obstacle_estimator.estimate", "tool_navigation.obstacle"),
-    ("target_estimator.estimate", "tool_navigation.target"),
+    ("obstacles.estimates", "tool_navigation.obstacles"),
+    ("target.estimate", "tool_navigation.target"),
     ("endoscope.view_cone", "tool_navigation.view_cone"),
     ("tool_navigation.tool", "joint_commands.tool"),
     ("joint_commands.set_point", "plant.pa10_desired_state"),
-    # What people hold in their hands moves the bodies of the scene.
-    ("target_tool.shaft", "posed_tools.S"),
-    ("obstacle_tool.shaft", "posed_tools.O"),
-    ("endoscope.shaft", "posed_tools.C"),
 )
-"""Every signal of the diagram but the plant's own, the fulcrum known."""
+"""Every signal but the plant's own and those of `tool_wires`, the fulcrum known.
+
+`target` is S's estimator, whatever S is called; `obstacles` the others' together.
+"""
+
+
+def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
+    """The wires of the surgeon's tools: seen by the tracker, made sense of, shown."""
+    wires = [
+        ("tracker_noise.output", "optical_tracker.noise"),
+        ("endoscope.shaft", f"posed_tools.{scenario.camera.name}"),
+    ]
+    for name, tool in hands(scenario.tools, scenario.seed).items():
+        wires += [
+            (f"{name}_tool.shaft", f"optical_tracker.{name}"),
+            (f"optical_tracker.{name}_measured", f"{name}_estimator.measurement"),
+            (f"{name}_tool.shaft", f"posed_tools.{name}"),
+        ]
+        if tool.hunt.speed:
+            wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))
+    if len(scenario.obstacles) > 1:
+        wires += [
+            (f"{tool.name}_estimator.estimate", f"obstacle_estimates.u{index}")
+            for index, tool in enumerate(scenario.obstacles)
+        ]
+    return wires
+
 
 TOLD = (
     ("fulcrum.y0", "robot_location.fulcrum"),
@@ -97,19 +120,11 @@ EMULATED = (
 EXTRA_WIRES = (
     ("endoscope.estimate", "go_to_target.camera"),
     ("endoscope.view_cone", "go_to_target.view_cone"),
-    ("robot_location.robot_tool", "obstacle_tool.robot_tool"),
 )
-"""Wires to inputs that only some forms of a block have: the bypass, a hunting tool."""
+"""Wires to inputs that only the bypass has."""
 
 EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
-    "target.shaft": "target_tool.shaft",
-    "obstacle.shaft": "obstacle_tool.shaft",
-    "obstacle.tip_velocity": "obstacle_tool.tip_velocity",
-    "target.estimate": "target_estimator.estimate",
-    "obstacle.estimate": "obstacle_estimator.estimate",
-    "camera.shaft": "endoscope.shaft",
-    "camera.view_cone": "endoscope.view_cone",
     "planner.guide": "go_to_target.guide",
     "planner.v1": "go_to_target.v1",
     "planner.v2": "velocity_corrections.v2",
@@ -129,8 +144,40 @@ EXPORTS = {
 }
 """What can be logged, and drawn."""
 
+
+def tool_exports(scenario: GauzeScenario) -> dict[str, str]:
+    """The tools' share of what can be logged: `NAME.shaft`, `NAME.estimate`, ..."""
+    exports: dict[str, str] = {}
+    for name in hands(scenario.tools, scenario.seed):
+        exports |= {
+            f"{name}.shaft": f"{name}_tool.shaft",
+            f"{name}.tip_velocity": f"{name}_tool.tip_velocity",
+            f"{name}.estimate": f"{name}_estimator.estimate",
+        }
+    camera = scenario.camera.name
+    return exports | {
+        f"{camera}.shaft": "endoscope.shaft",
+        f"{camera}.view_cone": "endoscope.view_cone",
+    }
+
+
 EXTRA_EXPORTS = {"planner.way": "go_to_target.way"}
 """Outputs that only the bypass has."""
+
+
+def make_tool(tool: HandTool) -> Any:
+    """The block of a tool in the surgeon's hand."""
+    return HuntingTool(tool, tool.hunt) if tool.hunt.speed else SurgeonTool(tool)
+
+
+def aliases(scenario: GauzeScenario) -> dict[str, str]:
+    """What `WIRES` calls the estimates: output by name, whatever the tools' names."""
+    known = [f"{tool.name}_estimator.estimate" for tool in scenario.obstacles]
+    together = "obstacle_estimates.y0" if len(known) > 1 else known[0]
+    return {
+        "target.estimate": f"{scenario.target.name}_estimator.estimate",
+        "obstacles.estimates": together,
+    }
 
 
 def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
@@ -141,54 +188,66 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         posture: Joint positions at the start (7) [rad].
     """
     s = scenario
-    target = replace(s.target, tremor_seed=2 * s.seed)
-    obstacle = replace(s.obstacle, tremor_seed=2 * s.seed + 1)
-    if s.recording:
-        obstacle.recording = s.recording
-    estimators = [
-        replace(
-            s.estimator,
-            body=s.tracker.body,  # the estimators know the tracker they listen to
-            period=s.tracker.period,
-            fulcrum=tool.p_WG if s.known_fulcrums else None,
-        )
-        for tool in (target, obstacle)
-    ]
-    limits = replace(
-        s.workspace,  # the planner knows the limits of the navigation behind it
-        min_insertion=s.navigation.min_insertion,
-        max_insertion=s.navigation.max_insertion,
-        max_tilt=s.navigation.max_tilt,
-        cone_margin=s.navigation.cone_margin,
-    )
-    blocks = {
-        "target_tool": SurgeonTool(target),
-        "obstacle_tool": HuntingTool(obstacle, s.hunt)
-        if s.hunt.speed
-        else SurgeonTool(obstacle),
-        "optical_tracker": OpticalTracker(s.tracker),
+    tools = hands(s.tools, s.seed)
+    obstacles = [name for name, tool in tools.items() if tool.role == OBSTACLE]
+    # The planner knows the limits of the navigation behind it.
+    around = (s.margins, s.navigation, s.workspace)
+    blocks: dict[str, Any] = {
+        "optical_tracker": OpticalTracker(s.tracker, list(tools)),
         "tracker_noise": RandomSource(
-            RandomDistribution.kGaussian, 12, s.tracker.period
+            RandomDistribution.kGaussian, 6 * len(tools), s.tracker.period
         ),
-        "target_estimator": TrajectoryEstimator(estimators[0]),
-        "obstacle_estimator": TrajectoryEstimator(estimators[1]),
         "endoscope": Endoscope(s.camera),
         "robot_location": RobotLocation(s.instrument),
-        "go_to_target": ToolBypass(s.tool_bypass, s.margins, limits)
+        "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles=obstacles)
         if s.behaviour == "bypass"
-        else GoToTarget(s.go_to_target),
-        "velocity_corrections": VelocityCorrections(s.velocity_corrections),
-        "backward_movement": BackwardMovement(s.backward_movement),
-        "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter),
+        else GoToTarget(s.go_to_target, obstacles),
+        "velocity_corrections": VelocityCorrections(s.velocity_corrections, obstacles),
+        "backward_movement": BackwardMovement(s.backward_movement, obstacles),
+        "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter, obstacles),
         "clearance_constraint": ClearanceConstraint(
-            s.clearance_constraint, s.margins, limits
+            s.clearance_constraint, *around, obstacles=obstacles
         ),
-        "tool_navigation": ToolNavigation(s.navigation, s.robot.p_WP, s.robot.p_WG),
+        "tool_navigation": ToolNavigation(
+            s.navigation, s.robot.p_WP, s.robot.p_WG, obstacles
+        ),
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
+    for name, tool in tools.items():
+        blocks[f"{name}_tool"] = make_tool(tool)
+        blocks[f"{name}_estimator"] = TrajectoryEstimator(
+            replace(
+                s.estimator,
+                body=s.tracker.body,  # it knows the tracker that it listens to
+                period=s.tracker.period,
+                fulcrum=tool.p_WG if s.known_fulcrums else None,
+            )
+        )
+    if len(obstacles) > 1:
+        blocks["obstacle_estimates"] = Multiplexer([size(Estimate)] * len(obstacles))
     if not s.emulated:
         blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
     return blocks
+
+
+def wiring(
+    scenario: GauzeScenario, systems: Mapping[str, Any]
+) -> tuple[list[tuple[str, str]], dict[str, str]]:
+    """All wires between the systems, and what is exported of them.
+
+    Args:
+        scenario: The parameters.
+        systems: Plant and blocks by their names.
+    """
+    wires = [*WIRES, *tool_wires(scenario)]
+    exports = EXPORTS | tool_exports(scenario)
+    if scenario.emulated:
+        wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
+        exports |= WRIST_EXPORTS
+    wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
+    exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    known = aliases(scenario)
+    return [(known.get(source, source), sink) for source, sink in wires], exports
 
 
 def make_gauze_diagram(
@@ -211,11 +270,7 @@ def make_gauze_diagram(
     theatre = add_theatre(builder, scenario)
     blocks = add_blocks(builder, make_blocks(scenario, theatre.posture), swaps)
     systems = theatre.systems | blocks
-    wires, exports = [*WIRES], {**EXPORTS}
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
-        wires = [*(w for w in WIRES if w not in TOLD), *EMULATED]
-        exports |= WRIST_EXPORTS
-    wires += [w for w in EXTRA_WIRES if has_input(systems, w[1])]
-    exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    wires, exports = wiring(scenario, systems)
     return finish(builder, "gauze_delivery", systems, wires, exports)

@@ -6,7 +6,8 @@ import numpy as np
 
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
-from systems.motion.tool_navigation import REASONS, WAITING
+from diagrams.gauze.tools import gap, logged
+from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
 """The gauze is delivered while the tip is this close to S's true tip [m] ..."""
@@ -34,50 +35,49 @@ def stops(time: np.ndarray, codes: np.ndarray) -> list[dict[str, Any]]:
     Waiting for the tracker's first frame is no stop: the robot has not moved yet.
     """
     found = []
-    for code, reason in REASONS.items():
-        if code == WAITING:
-            continue
-        for first, last in spans(np.round(codes) == code):
+    for stop in set(Stop) - {Stop.MOVING, Stop.WAITING}:
+        for first, last in spans(np.round(codes) == stop):
             end = time[min(last + 1, len(time) - 1)]
             start = float(time[first])
             found.append(
-                {"reason": reason, "start": start, "duration": float(end) - start}
+                {"reason": stop.text, "start": start, "duration": float(end) - start}
             )
-    return sorted(found, key=lambda stop: stop["start"])
+    return sorted(found, key=lambda one: one["start"])
 
 
-def in_cone(points: np.ndarray, cones: np.ndarray) -> np.ndarray:
-    """Whether each point (n, 3) lies in its view cone (n, 7), shape (n,)."""
-    rays = points - cones[:, :3]
-    cosine = np.einsum("ni,ni->n", rays, cones[:, 3:6]) / np.linalg.norm(rays, axis=1)
-    return np.arccos(np.clip(cosine, -1.0, 1.0)) <= cones[:, 6]
+def in_cone(points: np.ndarray, cone: Any) -> np.ndarray:
+    """Whether each point (n, 3) lies in its view cone, shape (n,)."""
+    rays = points - cone.apex
+    cosine = np.einsum("ni,ni->n", rays, cone.u) / np.linalg.norm(rays, axis=1)
+    return np.arccos(np.clip(cosine, -1.0, 1.0)) <= cone.half
 
 
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     time = run.signals["time"]
-    tip = run.matrix("robot.tool")[:, 3:]
-    tip_error = np.linalg.norm(tip - run.matrix("target.shaft")[:, :3], axis=1)
-    clearance = run.matrix("clearance")
-    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+    tip = run.robot.tool.tip
+    tip_error = np.linalg.norm(tip - logged(run, run.scenario.target).shaft.tip, axis=1)
+    force = np.linalg.norm(run.wall.force.f, axis=1)
     arrival = time_to_target(time, tip_error)
-    touched = bool(clearance[:, 0].min() <= 0.0)
+    touched = bool(gap(run, "obstacle").min() <= 0.0)
     speed = np.linalg.norm(np.gradient(tip, time, axis=0), axis=1)
     figures = {
         "reached": arrival is not None and not touched,
         "contact": touched,
         "time_to_target": arrival,
         "final_tip_error": float(tip_error[-1]),
-        "min_tool_clearance": float(clearance[:, 0].min()),
-        "min_target_clearance": float(clearance[:, 1].min()),
-        "min_camera_clearance": float(clearance[:, 2].min()),
+        "min_tool_clearance": float(gap(run, "obstacle").min()),
+        "min_target_clearance": float(gap(run, "target").min()),
+        "min_camera_clearance": float(gap(run, "camera").min()),
         "max_lateral_force": float(force.max()),
         "rms_lateral_force": float(np.sqrt(np.mean(force**2))),
-        "max_fulcrum_error": float(run.signals["wall.fulcrum_error"].max()),
-        "time_in_view": float(in_cone(tip, run.matrix("camera.view_cone")).mean()),
+        "max_fulcrum_error": float(run.wall.fulcrum_error.distance.max()),
+        "time_in_view": float(
+            in_cone(tip, logged(run, run.scenario.camera).view_cone).mean()
+        ),
         "max_speed": float(speed.max()),
-        "joint_limit_time": float(np.mean(run.signals["joints.status"]) * time[-1]),
-        "stops": stops(time, run.signals["navigation.stop"]),
+        "joint_limit_time": float(np.mean(run.joints.status.code) * time[-1]),
+        "stops": stops(time, run.navigation.stop.code),
     }
     figures |= bypass_figures(run, arrival, tip_error)
     if run.scenario.emulated:

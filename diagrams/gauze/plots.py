@@ -8,6 +8,7 @@ import numpy as np
 from diagrams.bedside import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.gauze.bypass_plots import clearance
+from diagrams.gauze.tools import TARGET, gap, logged
 from systems.common.geometry import closest_points
 
 MM = 1e3
@@ -18,36 +19,29 @@ def _shaft(axes: Any, p_WG: np.ndarray, p_WP: np.ndarray, **style: Any) -> None:
     axes.plot(*np.column_stack([p_WG, p_WP]), solid_capstyle="round", **style)
 
 
-def _fulcrum(run: Any, who: str) -> np.ndarray:
-    """A tool's true fulcrum in W [m], shape (3,)."""
-    return np.array(getattr(run.scenario, who).p_WG)
-
-
 def trajectory(run: Any) -> Figure:
     """The trajectory in 3-D with both of the surgeon's tools (Figures 7, 8 above)."""
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
-    tool = run.matrix("robot.tool") * MM
-    tip, p_WG = tool[:, 3:], tool[0, :3]
-    target = run.matrix("target.shaft")[:, :3] * MM
-    obstacle = run.matrix("obstacle.shaft")[:, :3] * MM
-    p_WGO, p_WGS = _fulcrum(run, "obstacle") * MM, _fulcrum(run, "target") * MM
+    tip, p_WG = run.robot.tool.tip * MM, run.robot.tool.fulcrum[0] * MM
+    seen = [tip, p_WG]
     marks = max(1, len(tip) // 60)
     axes.plot(*tip.T, color=COLORS["robot"], lw=0.8)
     axes.plot(*tip[::marks].T, "*", color=COLORS["robot"], ms=4, label="robot's tip R")
-    for index in np.linspace(0, len(tip) - 1, 5).astype(int):
+    instants = np.linspace(0, len(tip) - 1, 5).astype(int)
+    for index in instants:
         _shaft(axes, p_WG, tip[index], color=COLORS["robot"], lw=1.5, alpha=0.25)
-        _shaft(axes, p_WGO, obstacle[index], color=COLORS["obstacle"], lw=2, alpha=0.3)
-    _shaft(axes, p_WGO, obstacle[0], color=COLORS["obstacle"], lw=3, label="obstacle O")
-    _shaft(axes, p_WGS, target[-1], color=COLORS["target"], lw=3, label="target S")
-    axes.plot(*obstacle[::marks].T, ".", color=COLORS["obstacle"], ms=3)
-    axes.plot(*target[::marks].T, ".", color=COLORS["target"], ms=3)
-    equal_axes(
-        axes,
-        np.vstack([tip, target, obstacle, [p_WG, p_WGO, p_WGS]]),
-        margin=5.0,
-        elevation=22,
-    )
+    for tool in [*run.scenario.obstacles, run.scenario.target]:
+        way, fulcrum = logged(run, tool).shaft.tip * MM, np.array(tool.p_WG) * MM
+        color, is_target = COLORS[tool.role], tool.role == TARGET
+        for index in () if is_target else instants:
+            _shaft(axes, fulcrum, way[index], color=color, lw=2, alpha=0.3)
+        label = "target S" if is_target else f"{tool.name} O".replace("_", " ")
+        shown = way[-1 if is_target else 0]
+        _shaft(axes, fulcrum, shown, color=color, lw=3, label=label)
+        axes.plot(*way[::marks].T, ".", color=color, ms=3)
+        seen += [way, fulcrum]
+    equal_axes(axes, np.vstack(seen), margin=5.0, elevation=22)
     axes.legend(loc="upper left")
     axes.set_title(run.scenario.description)
     return figure
@@ -61,23 +55,24 @@ def speeds(run: Any) -> Figure:
     """
     figure = new_figure(7.0, 5.6)
     time = run.signals["time"]
-    guide = run.matrix("planner.guide")
-    s = np.maximum(guide[:, 7], run.scenario.navigation.min_proportion)
-    v_1 = np.linalg.norm(run.matrix("planner.v1"), axis=1) / s
-    v_R = np.linalg.norm(run.matrix("planner.v_R"), axis=1) / s
-    v_O = np.linalg.norm(run.matrix("obstacle.tip_velocity"), axis=1) * guide[:, 8]
+    guide = run.planner.guide
+    s = np.maximum(guide.s, run.scenario.navigation.min_proportion)
+    v_1 = np.linalg.norm(run.planner.v1.v, axis=1) / s
+    v_R = np.linalg.norm(run.planner.v_R.v, axis=1) / s
     upper = add_axes(figure, 2, 1, 1)
     upper.plot(time, v_R * MM, "-", color=COLORS["robot"], label="commanded v_R")
     upper.plot(time, v_1 * MM, "--", color=COLORS["accent"], label="field v_1")
-    upper.plot(time, v_O * MM, ":", color=COLORS["obstacle"], label="obstacle at M_O")
+    for tool in run.scenario.obstacles:
+        v_O = np.linalg.norm(logged(run, tool).tip_velocity.v, axis=1) * guide.l_over_L
+        label = f"{tool.name} at M_O".replace("_", " ")
+        upper.plot(time, v_O * MM, ":", color=COLORS["obstacle"], label=label)
     upper.set(ylabel="speed of the tip [mm/s]", xlim=(0, time[-1]), ylim=(0, None))
     upper.legend(ncols=3, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
-    clearance = run.matrix("clearance") * MM
-    error = np.linalg.norm(
-        run.matrix("robot.tool")[:, 3:] - run.matrix("target.shaft")[:, :3], axis=1
-    )
-    lower.plot(time, clearance[:, 0], color=COLORS["obstacle"], label="clearance to O")
+    clear = gap(run, "obstacle") * MM
+    target = logged(run, run.scenario.target).shaft.tip
+    error = np.linalg.norm(run.robot.tool.tip - target, axis=1)
+    lower.plot(time, clear, color=COLORS["obstacle"], label="clearance to O")
     lower.plot(time, error * MM, color=COLORS["target"], label="tip to S's tip")
     lower.axhline(0.0, color="k", lw=0.6)
     for stop in run.metrics["stops"]:
@@ -96,11 +91,11 @@ def forces(run: Any) -> Figure:
     figure = new_figure(7.0, 4.2)
     time = run.signals["time"]
     upper = add_axes(figure, 2, 1, 1)
-    force = np.linalg.norm(run.matrix("wall.force"), axis=1)
+    force = np.linalg.norm(run.wall.force.f, axis=1)
     upper.plot(time, force, color=COLORS["obstacle"])
     upper.set(ylabel="lateral force [N]", xlim=(0, time[-1]), ylim=(0, None))
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
-    lower.plot(time, run.signals["wall.fulcrum_error"] * MM, color=COLORS["robot"])
+    lower.plot(time, run.wall.fulcrum_error.distance * MM, color=COLORS["robot"])
     lower.set(xlabel="time [s]", ylabel="shaft off fulcrum [mm]", ylim=(0, None))
     return figure
 
@@ -109,12 +104,13 @@ def virtual_force(run: Any) -> Figure:
     """The geometry of the virtual force (Figure 5) where R came closest to O."""
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
-    index = int(run.matrix("clearance")[:, 0].argmin())
-    tool = run.matrix("robot.tool")[index] * MM
-    p_WP, p_WG = tool[3:], tool[:3]
-    p_WO = run.matrix("obstacle.shaft")[index, :3] * MM
-    p_WS = run.matrix("target.shaft")[index, :3] * MM
-    p_WGO = _fulcrum(run, "obstacle") * MM
+    index = int(gap(run, "obstacle").argmin())
+    p_WP, p_WG = (p[index] * MM for p in (run.robot.tool.tip, run.robot.tool.fulcrum))
+    nearest = int(run.clearance.distance[index, : len(run.scenario.obstacles)].argmin())
+    obstacle = run.scenario.obstacles[nearest]
+    p_WO = logged(run, obstacle).shaft.tip[index] * MM
+    p_WS = logged(run, run.scenario.target).shaft.tip[index] * MM
+    p_WGO = np.array(obstacle.p_WG) * MM
     M_R, M_O = map(
         np.array,
         closest_points(*(tuple(x.tolist()) for x in (p_WG, p_WP, p_WGO, p_WO)))[3:],
@@ -127,7 +123,7 @@ def virtual_force(run: Any) -> Figure:
         axes, p_WG, p_WS, color=COLORS["target"], lw=1.5, ls="--", label="target line"
     )
     _shaft(axes, M_R, M_O, color="k", lw=1.2, ls=":", label="distance rho")
-    v_1 = run.matrix("planner.v1")[index]
+    v_1 = run.planner.v1.v[index]
     to_goal = M_Rf - M_R
     size = 20.0
     for vector, color, label in (

@@ -12,50 +12,69 @@ from diagrams.common.study import Study, View
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.plots import plots
-from diagrams.gauze.scenario import GauzeScenario, check
-
-XYZ = ("x", "y", "z")
-SHAFT = ("tip_x", "tip_y", "tip_z", "u_x", "u_y", "u_z")
-ESTIMATE = (
-    *(f"{part}_{axis}" for part in ("p", "v", "a", "fulcrum") for axis in XYZ),
-    *("sigma_p", "sigma_v", "sigma_a", "known", "age"),
+from diagrams.gauze.scenario import GauzeScenario, check, companions
+from diagrams.gauze.tools import OBSTACLE, gather, hands, in_the_way, logged
+from plants.abdomen.wall_force import FulcrumError
+from plants.arm.signals import Posture
+from plants.instruments.clearance import Gap, column
+from systems.auto_guidance.fuzzy_arbiter import Weights
+from systems.bypass.clearance_constraint import ClearanceStatus
+from systems.bypass.tool_bypass import Way
+from systems.common.signal import Many
+from systems.common.signals import (
+    Estimate,
+    Force,
+    Guide,
+    RobotTool,
+    Shaft,
+    ToolMotion,
+    Velocity,
+    ViewCone,
 )
-SIGNALS: dict[str, tuple[str, ...]] = {
-    "robot.tool": (*(f"fulcrum_{axis}" for axis in XYZ), "tip_x", "tip_y", "tip_z"),
-    "target.shaft": SHAFT,
-    "obstacle.shaft": SHAFT,
-    "obstacle.tip_velocity": XYZ,
-    "target.estimate": ESTIMATE,
-    "obstacle.estimate": ESTIMATE,
-    "camera.view_cone": (*(f"apex_{a}" for a in XYZ), "u_x", "u_y", "u_z", "half"),
-    "planner.guide": (
-        *(f"M_R_{axis}" for axis in XYZ),
-        *(f"M_O_{axis}" for axis in XYZ),
-        *("rho", "s", "l_over_L"),
-        *(f"M_Rf_{axis}" for axis in XYZ),
-    ),
-    "planner.v1": XYZ,
-    "planner.v2": XYZ,
-    "planner.v3": XYZ,
-    "planner.weights": ("c1", "c2", "c3"),
-    "planner.v_R": XYZ,
-    "planner.v_safe": XYZ,
-    "planner.clearance": ("room", "near", "condition", "dodge", "change", "missed"),
-    "planner.way": ("way", "waiting", "aim_x", "aim_y", "aim_z", "switches"),
-    "navigation.tool": (
-        *SHAFT,
-        *(f"v_{axis}" for axis in XYZ),
-        *(f"du_{axis}" for axis in XYZ),
-        "time",
-    ),
-    "navigation.stop": ("code",),
-    "joints.posture": tuple(f"q{i}" for i in range(1, 8)),
-    "joints.status": ("code",),
-    "clearance": ("obstacle", "target", "camera"),
-    "wall.force": XYZ,
-    "wall.fulcrum_error": ("distance",),
-    **WRIST_SIGNALS,
+from systems.motion.joint_commands import Status
+from systems.motion.tool_navigation import StopCode
+
+SIGNALS = {
+    "planner.guide": Guide,
+    "planner.v1": Velocity,
+    "planner.v2": Velocity,
+    "planner.v3": Velocity,
+    "planner.weights": Weights,
+    "planner.v_R": Velocity,
+    "planner.v_safe": Velocity,
+    "planner.clearance": ClearanceStatus,
+    "planner.way": Way,
+    "navigation.tool": ToolMotion,
+    "navigation.stop": StopCode,
+    "joints.posture": Posture,
+    "joints.status": Status,
+    "clearance": Gap,
+    "wall.force": Force,
+    "wall.fulcrum_error": FulcrumError,
 }
+
+
+def signals(scenario: GauzeScenario) -> dict[str, Any]:
+    """What is logged: without the bypass there is no way, without force no wrist."""
+    ports: dict[str, Any] = {"robot.tool": RobotTool}
+    tools = hands(scenario.tools, scenario.seed)
+    ports |= {f"{name}.shaft": Shaft for name in tools}
+    obstacles = [name for name, tool in tools.items() if tool.role == OBSTACLE]
+    ports |= {f"{name}.tip_velocity": Velocity for name in obstacles}
+    ports |= {f"{name}.estimate": Estimate for name in tools}
+    ports |= {f"{scenario.camera.name}.view_cone": ViewCone}
+    near = in_the_way(scenario.tools)
+    columns = tuple(column(name, role, near) for name, role in near)
+    ports |= {
+        port: Many(Gap, columns) if port == "clearance" else kind
+        for port, kind in SIGNALS.items()
+    }
+    ports |= WRIST_SIGNALS if scenario.emulated else {}
+    if scenario.behaviour != "bypass":
+        del ports["planner.way"]
+    return ports
+
+
 METRES_PER_NEWTON = 0.02
 """Scale of the replay's force arrow."""
 
@@ -63,15 +82,15 @@ METRES_PER_NEWTON = 0.02
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """Trails of both tips, and the wall's force as an arrow at the fulcrum."""
     time = run.signals["time"]
-    for name, signal, rgba in (
-        ("robot", run.matrix("robot.tool")[:, 3:], (0.12, 0.37, 0.85, 1.0)),
-        ("obstacle", run.matrix("obstacle.shaft")[:, :3], (0.85, 0.2, 0.15, 1.0)),
-    ):
-        draw_trail(meshcat, animation, f"trails/{name}", time, signal, rgba)
+    trails = {"robot": (run.robot.tool.tip, (0.12, 0.37, 0.85, 1.0))}
+    for tool in run.scenario.obstacles:
+        trails[tool.name] = (logged(run, tool).shaft.tip, (0.85, 0.2, 0.15, 1.0))
+    for name, (way, rgba) in trails.items():
+        draw_trail(meshcat, animation, f"trails/{name}", time, way, rgba)
     if run.scenario.emulated:
         decorate_wrist(meshcat, animation, run)
         return
-    force = run.matrix("wall.force") * METRES_PER_NEWTON
+    force = run.wall.force.f * METRES_PER_NEWTON
     origins = np.broadcast_to(run.scenario.robot.p_WG, force.shape)
     draw_arrow(
         meshcat, animation, "wall_force", time, origins, force, (0.95, 0.6, 0.1, 1.0)
@@ -81,16 +100,17 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
 STUDY = Study(
     name="gauze",
     scenario=GauzeScenario,
-    make_diagram=make_gauze_diagram,
+    make_diagram=lambda case: make_gauze_diagram(case.scenario),
+    gather=gather,
     check=check,
     measure=measure,
-    signals=SIGNALS,
-    optional=frozenset({*WRIST_SIGNALS, "planner.way"}),
+    signals=signals,
     log_period=1.0 / 30.0,
     plots=plots,
     decorate=decorate,
     controller="tool_navigation",
     adjust=stiffen,
+    companions=companions,
     required=(
         "system",
         "duration",

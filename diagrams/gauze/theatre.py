@@ -3,6 +3,7 @@
 from typing import Any
 
 from diagrams.bedside.bedside import Bedside, add_bedside
+from diagrams.gauze.tools import in_the_way
 from plants.instruments.clearance import add_clearance
 from plants.instruments.posed_tools import PosedToolsParams, add_posed_tools
 
@@ -19,17 +20,18 @@ def add_theatre(builder: Any, scenario: Any) -> Bedside:
     """
     bedside = add_bedside(builder, scenario)
     plant, scene_graph = bedside.systems["plant"], bedside.systems["scene_graph"]
+    tools = [(tool.name, tool.role) for tool in scenario.tools]
     looks = PosedToolsParams(
         view_half_angle=scenario.camera.half_angle,
-        fulcrums=[
-            scenario.target.p_WG,
-            scenario.obstacle.p_WG,
-            scenario.camera.p_WG,
-        ],
+        fulcrums=[tool.p_WG for tool in scenario.tools],
     )
-    tools = add_posed_tools(builder, scene_graph, plant, looks)
-    bedside.systems["posed_tools"] = tools
+    posed = add_posed_tools(builder, scene_graph, plant, looks, tools)
+    bedside.systems["posed_tools"] = posed
     bedside.systems["clearance"] = add_clearance(
-        builder, scene_graph, bedside.instrument.shaft_geometry, tools.shafts
+        builder,
+        scene_graph,
+        bedside.instrument.shaft_geometry,
+        posed.shafts,
+        in_the_way(scenario.tools),
     )
     return bedside

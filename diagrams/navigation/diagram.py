@@ -11,12 +11,14 @@ from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.navigation.scenario import NavigationScenario, discs, heading
 from plants.crowd.crowd_motion import CrowdMotion
-from plants.crowd.obstacle_motion import ObstacleMotion, ObstacleParams
+from plants.crowd.obstacle_motion import ObstacleMotion
 from plants.turtlebot.arena import add_arena
 from plants.turtlebot.turtlebot import make_turtlebot
+from systems.common.signal import size
 from systems.switching.classical_planner import ClassicalPlanner
 from systems.switching.navigation_planner import PERIOD
 from systems.switching.perception import Perception
+from systems.switching.signals import NOISE
 from systems.switching.statechart_planner import StatechartPlanner
 from systems.switching.switching_planner import SwitchingPlanner
 from systems.switching.unicycle_control import UnicycleControl
@@ -51,19 +53,16 @@ EXPORTS = {
 }
 """What can be logged, and drawn."""
 
-CAPACITY = 24
-"""Number of obstacles that signals have room for."""
-
 
 def make_planner(scenario: NavigationScenario) -> Any:
     """The planner that the scenario names; its body and limits are the robot's."""
     radius, speed = scenario.robot.radius, scenario.robot.speed
     if scenario.planner == "classical":
         classical = replace(scenario.classical, body_radius=radius, speed=speed)
-        return ClassicalPlanner(classical, CAPACITY)
+        return ClassicalPlanner(classical)
     if scenario.planner == "statechart":
         statechart = replace(scenario.statechart, body_radius=radius, speed=speed)
-        return StatechartPlanner(statechart, CAPACITY)
+        return StatechartPlanner(statechart)
     switching = replace(
         scenario.switching,
         body_radius=radius,
@@ -74,18 +73,16 @@ def make_planner(scenario: NavigationScenario) -> Any:
             scenario.switching.standing_speed, 3.0 * scenario.perception.velocity_noise
         ),
     )
-    return SwitchingPlanner(switching, CAPACITY)
+    return SwitchingPlanner(switching)
 
 
 def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that `WIRES` uses."""
     s = scenario
     if s.crowd.people:
-        obstacles: Any = CrowdMotion(s.crowd, CAPACITY)
+        obstacles: Any = CrowdMotion(s.crowd)
     else:
-        # A world without obstacles: one that is far away.
-        nothing = ObstacleParams(start=[1e3, 1e3], radius=0.01)
-        obstacles = ObstacleMotion(s.obstacles or [nothing], CAPACITY)
+        obstacles = ObstacleMotion(s.obstacles)
     control = replace(
         s.control,
         speed=s.robot.speed,
@@ -95,8 +92,8 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     return {
         "robot": make_turtlebot(s.robot, [*s.start, heading(s)]),
         "obstacles": obstacles,
-        "noise": RandomSource(RandomDistribution.kGaussian, 4 * CAPACITY, PERIOD),
-        "perception": Perception(s.perception, CAPACITY),
+        "noise": RandomSource(RandomDistribution.kGaussian, size(NOISE), PERIOD),
+        "perception": Perception(s.perception),
         "goal": ConstantVectorSource(s.goal),
         "planner": make_planner(s),
         "control": UnicycleControl(control),
@@ -106,7 +103,7 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
 def floor(scenario: NavigationScenario) -> list[float]:
     """Least x, least y, greatest x, greatest y [m] of what is worth seeing."""
     points = [scenario.start, scenario.goal]
-    points += [[x, y] for x, y, _ in discs(scenario)]
+    points += [[o.x, o.y] for o in discs(scenario)]
     xs, ys = zip(*points, strict=True)
     return [min(xs) - 1.5, min(ys) - 1.5, max(xs) + 1.5, max(ys) + 1.5]
 
@@ -130,8 +127,7 @@ def make_navigation_diagram(
     builder = DiagramBuilder()
     scene_graph, arena = add_arena(
         builder,
-        radii=[radius for _, _, radius in discs(scenario)],
-        capacity=CAPACITY,
+        radii=[o.radius for o in discs(scenario)],
         radius=scenario.robot.radius,
         vision=scenario.perception.vision,
         goal=scenario.goal,

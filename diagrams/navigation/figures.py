@@ -11,8 +11,8 @@ import pygraphviz
 
 from diagrams.common.plots import COLORS, add_axes, new_figure
 from systems.switching import fields
-from systems.switching.arcs import Obstacle
 from systems.switching.classical_planner import ClassicalParams, summed_fields
+from systems.switching.signals import Seen
 
 GOAL = (1.0, 1.5)
 """Of Figures 4 and 5 [m]."""
@@ -78,7 +78,7 @@ def arrows(
 def total_potential(
     axes: Any,
     params: ClassicalParams,
-    obstacles: Sequence[Obstacle],
+    obstacles: Sequence[Seen],
     goal: Sequence[float],
     low: Sequence[float],
     high: Sequence[float],
@@ -93,10 +93,9 @@ def total_potential(
         low: Least x, y [m].
         high: Greatest x, y [m].
     """
-    x, y = np.meshgrid(
-        np.linspace(low[0], high[0], 90), np.linspace(low[1], high[1], 90)
-    )
-    z = 0.5 * params.gain * ((x - goal[0]) ** 2 + (y - goal[1]) ** 2)
+    (left, bottom), (right, top), (goal_x, goal_y) = low, high, goal
+    x, y = np.meshgrid(np.linspace(left, right, 90), np.linspace(bottom, top, 90))
+    z = 0.5 * params.gain * ((x - goal_x) ** 2 + (y - goal_y) ** 2)
     # Saturated attraction: linear beyond the distance at which it is full.
     far = params.speed / params.gain
     distance = np.sqrt(2.0 * z / params.gain)
@@ -114,7 +113,7 @@ def total_potential(
     axes.contourf(x, y, np.minimum(z, 6.0), 30, cmap="Greys", alpha=0.5)
     step = slice(3, None, 6)
     u, v = np.vectorize(
-        lambda a, b: summed_fields(params, (a, b), (goal[0], goal[1]), obstacles)
+        lambda a, b: summed_fields(params, (a, b), (goal_x, goal_y), obstacles)
     )(x[step, step], y[step, step])
     axes.quiver(x[step, step], y[step, step], u, v, color=COLORS["muted"], pivot="mid")
 

@@ -10,6 +10,8 @@ import numpy as np
 from diagrams.common.plots import COLORS, add_axes, new_figure
 from diagrams.navigation.figures import thesis_figures, total_potential
 from diagrams.navigation.metrics import gaps, goal_distance
+from diagrams.navigation.scenario import discs
+from systems.switching.signals import Seen
 from systems.switching.statechart_planner import STATES
 from systems.switching.switching_state import MODES
 
@@ -25,37 +27,27 @@ def state_names(planner: str) -> tuple[str, ...]:
     return {"switching": MODES, "statechart": STATES}.get(planner, ("sum of fields",))
 
 
-def companions(run: Any) -> dict[str, Any]:
-    """The run and those of the planners to compare with, by planner."""
-    from diagrams.common.run import simulate
-
-    runs = {run.scenario.planner: run}
-    for name in run.scenario.compare:
-        if name not in runs:
-            runs[name] = simulate(replace(run.scenario, planner=name, compare=[]))
-    return runs
-
-
 def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
     """Draws obstacles, fainter where they were earlier, start and goal.
 
     Time ends a little after the goal is reached.
     """
-    rows = run.matrix("obstacles.rows")
+    obstacles = run.obstacles.rows
     arrival = run.metrics["time_to_target"]
-    if arrival is not None:
-        rows = rows[run.signals["time"] <= arrival + 1.0]
-    rows = rows.reshape(len(rows), -1, 5)
-    for k in range(rows.shape[1]):
-        if rows[0, k, 2] <= 0.0 or abs(rows[0, k, 0]) > 500.0:
+    time = run.signals["time"]
+    shown = time <= (time[-1] if arrival is None else arrival + 1.0)
+    for x, y, radius in zip(
+        obstacles.x[shown].T, obstacles.y[shown].T, obstacles.radius[0], strict=True
+    ):
+        if radius <= 0.0:
             continue
-        track = rows[:, k, :2]
+        track = np.column_stack([x, y])
         moves = np.ptp(track, axis=0).max() > 1e-6
         count = moments if moves else 1
         for share in np.linspace(0.0, 1.0, count):
             x, y = track[int(share * (len(track) - 1))]
             alpha = 0.75 if not moves else 0.12 + 0.5 * share
-            disc = Circle((x, y), rows[0, k, 2], color=COLORS["obstacle"], lw=0)
+            disc = Circle((x, y), radius, color=COLORS["obstacle"], lw=0)
             disc.set_alpha(alpha)
             axes.add_patch(disc)
         if moves:
@@ -78,14 +70,17 @@ def outcome(run: Any) -> str:
 def draw_ways(axes: Any, runs: dict[str, Any]) -> None:
     """Draws the planners' ways, each until its run was decided."""
     for name, run in runs.items():
-        robot = run.matrix("robot.state")
+        robot = run.robot.state
         hit = np.flatnonzero(gaps(run).min(axis=1) <= 0.0)
-        robot = robot[: hit[0] + 1] if hit.size else robot
+        last = hit[0] if hit.size else len(robot.x) - 1
         label = f"{name}: {outcome(run)}"
-        axes.plot(*robot[:, :2].T, color=PLANNER_COLORS[name], lw=1.8, label=label)
+        way = robot.x[: last + 1], robot.y[: last + 1]
+        axes.plot(*way, color=PLANNER_COLORS[name], lw=1.8, label=label)
         if not run.metrics["reached"]:
             end = "X" if hit.size else "s"
-            axes.plot(*robot[-1, :2], end, color=PLANNER_COLORS[name], ms=7)
+            axes.plot(
+                robot.x[last], robot.y[last], end, color=PLANNER_COLORS[name], ms=7
+            )
 
 
 def path(run: Any, runs: dict[str, Any]) -> Figure:
@@ -94,11 +89,13 @@ def path(run: Any, runs: dict[str, Any]) -> Figure:
     axes = add_axes(figure, 1, 1, 1)
     draw_world(axes, run)
     draw_ways(axes, runs)
-    robot = run.matrix("robot.state")
+    robot = run.robot.state
     radius = run.scenario.robot.radius
     for share in np.linspace(0.0, 1.0, 6):
-        x, y = robot[int(share * (len(robot) - 1)), :2]
-        axes.add_patch(Circle((x, y), radius, fill=False, color=COLORS["robot"]))
+        k = int(share * (len(robot.x) - 1))
+        axes.add_patch(
+            Circle((robot.x[k], robot.y[k]), radius, fill=False, color=COLORS["robot"])
+        )
     axes.autoscale_view()
     figure.legend(loc="outside lower center", ncols=1)
     axes.set_title(run.scenario.description)
@@ -109,7 +106,7 @@ def motion(run: Any) -> Figure:
     """Clearance, distance to the goal, speed and state over time."""
     figure = new_figure(7.5, 6.5)
     time = run.signals["time"]
-    robot = run.matrix("robot.state")
+    robot = run.robot.state
     upper = add_axes(figure, 3, 1, 1)
     gap = gaps(run).min(axis=1)
     upper.plot(time, gap, color=COLORS["obstacle"], label="nearest obstacle")
@@ -118,12 +115,12 @@ def motion(run: Any) -> Figure:
     upper.set(ylabel="distance [m]", xlim=(0.0, time[-1]))
     upper.legend(loc="upper right")
     middle = add_axes(figure, 3, 1, 2, sharex=upper)
-    middle.plot(time, robot[:, 3], color=COLORS["robot"], label="speed [m/s]")
-    middle.plot(time, robot[:, 4], color=COLORS["accent"], label="turn rate [rad/s]")
+    middle.plot(time, robot.v, color=COLORS["robot"], label="speed [m/s]")
+    middle.plot(time, robot.omega, color=COLORS["accent"], label="turn rate [rad/s]")
     middle.legend(loc="upper right")
     lower = add_axes(figure, 3, 1, 3, sharex=upper)
     names = state_names(run.scenario.planner)
-    mode = np.round(run.matrix("planner.mode")[:, 0])
+    mode = np.round(run.planner.mode.state)
     lower.step(time, mode, where="post", color=COLORS["robot"])
     lower.set(xlabel="time [s]", yticks=range(len(names)), yticklabels=names)
     lower.set_ylim(-0.5, len(names) - 0.5)
@@ -133,9 +130,7 @@ def motion(run: Any) -> Figure:
 def potential(run: Any, runs: dict[str, Any]) -> Figure:
     """The classical total potential of the world, and the ways (Figures 7, 8)."""
     s = run.scenario
-    world = [
-        (float(k), *o.start, o.radius, 0.0, 0.0) for k, o in enumerate(s.obstacles)
-    ]
+    world = [Seen(float(k), *disc) for k, disc in enumerate(discs(s))]
     middle = 0.5 * (np.array(s.start) + s.goal)
     half = np.maximum(np.abs(middle - s.start) + 1.0, 3.5)
     low, high = middle - half, middle + half
@@ -153,7 +148,7 @@ def potential(run: Any, runs: dict[str, Any]) -> Figure:
 
 def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
-    runs = companions(run)
+    runs = {run.scenario.planner: run, **run.case.companions}
     figures = {"path": path(run, runs), "motion": motion(run)}
     if run.scenario.thesis_figures:
         figures["potential"] = potential(run, runs)

@@ -9,18 +9,20 @@ from pydrake.systems.analysis import SimulatorConfig
 
 from diagrams.common.replay import draw_trail
 from diagrams.common.study import Study, View
-from diagrams.navigation.diagram import CAPACITY, floor, make_navigation_diagram
+from diagrams.navigation.diagram import floor, make_navigation_diagram
 from diagrams.navigation.metrics import measure
 from diagrams.navigation.plots import plots, state_names
-from diagrams.navigation.scenario import NavigationScenario, check
+from diagrams.navigation.scenario import NavigationScenario, check, companions
+from plants.crowd.signals import OBSTACLES
+from plants.turtlebot.turtlebot import Command, RobotState
+from systems.switching.signals import Mode, PlanarVelocity
 
-ROWS = ("x", "y", "radius", "v_x", "v_y")
 SIGNALS = {
-    "robot.state": ("x", "y", "theta", "v", "omega"),
-    "obstacles.rows": tuple(f"{row}_{k}" for k in range(CAPACITY) for row in ROWS),
-    "planner.v_R": ("x", "y"),
-    "planner.mode": ("state", "track", "side", "retreat", "outrun"),
-    "control.command": ("speed", "turn_rate"),
+    "robot.state": RobotState,
+    "obstacles.rows": OBSTACLES,
+    "planner.v_R": PlanarVelocity,
+    "planner.mode": Mode,
+    "control.command": Command,
 }
 LAMPS = (
     (0.20, 0.66, 0.36, 1.0),  # attractive
@@ -43,8 +45,9 @@ def light(meshcat: Any, floor: list[float]) -> None:
         ("SpotLight", 0.0),
     ):
         meshcat.SetProperty(f"/Lights/{name}/<object>", "intensity", intensity)
-    x, y = 0.5 * (floor[0] + floor[2]), 0.5 * (floor[1] + floor[3])
-    size = max(floor[2] - floor[0], 1.3 * (floor[3] - floor[1]))
+    low_x, low_y, high_x, high_y = floor
+    x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+    size = max(high_x - low_x, 1.3 * (high_y - low_y))
     meshcat.SetCameraPose([x, y - 0.36 * size, 0.48 * size], [x, y, 0.0])
 
 
@@ -52,15 +55,15 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The robot's trail, and a lamp above it in the colour of the state."""
     light(meshcat, floor(run.scenario))
     time = run.signals["time"]
-    robot = run.matrix("robot.state")
-    trail = np.column_stack([robot[:, :2], np.full(len(time), 0.02)])
+    robot = run.robot.state
+    trail = np.column_stack([robot.x, robot.y, np.full(len(time), 0.02)])
     draw_trail(meshcat, animation, "trail", time, trail, (0.12, 0.37, 0.85, 1.0), 80)
-    mode = np.round(run.matrix("planner.mode")[:, 0]).astype(int)
+    mode = np.round(run.planner.mode.state).astype(int)
     for number, name in enumerate(state_names(run.scenario.planner)):
         lamp = f"lamp/{name.replace(' ', '_')}"
         meshcat.SetObject(lamp, Sphere(0.075), Rgba(*LAMPS[number]))
         shown: bool | None = None
-        for t, (x, y, *_), current in zip(time, robot, mode, strict=True):
+        for t, x, y, current in zip(time, robot.x, robot.y, mode, strict=True):
             frame = animation.frame(t)
             animation.SetTransform(frame, lamp, RigidTransform([x, y, 0.38]))
             if shown != (current == number):
@@ -71,14 +74,15 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
 STUDY = Study(
     name="navigation",
     scenario=NavigationScenario,
-    make_diagram=make_navigation_diagram,
+    make_diagram=lambda case: make_navigation_diagram(case.scenario),
     check=check,
     measure=measure,
-    signals=SIGNALS,
+    signals=lambda scenario: SIGNALS,
     log_period=0.05,
     plots=plots,
     decorate=decorate,
     controller="planner",
+    companions=companions,
     required=("system", "duration", "start", "goal"),
     frame_rate=20.0,  # as often as the planner: other instants would cost steps
     view=View(camera=(4.0, -7.5, 7.0), target=(4.5, 0.0, 0.0)),

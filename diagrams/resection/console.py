@@ -8,13 +8,10 @@ from collections.abc import Iterable
 from pathlib import Path
 import shlex
 
-from diagrams.common.scenario import ScenarioError
-from diagrams.resection.scenario import (
-    ResectionScenario,
-    finish_plan,
-    new_session,
-    reach_of,
-)
+from diagrams.common.progress import progress_bar
+from diagrams.common.scenario import refusals
+from diagrams.resection.operation import finish_plan, new_session, reach_of
+from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.labels import TUMOUR
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner
@@ -23,6 +20,7 @@ from systems.resection.planning.procedure import (
     ENTRY,
     VOLUME,
     Procedure,
+    check_procedure,
     load_procedures,
     save_procedures,
 )
@@ -86,7 +84,7 @@ class Console:
         command = words[0]
         if command in (ENTRY, ELEMENTARY, VOLUME):
             proposal = procedure_from(words)
-            proposal.check(self.session.params)
+            check_procedure(proposal, self.session.params)
             self.proposal = proposal
             return self._check()
         if command == "suggest":
@@ -100,8 +98,8 @@ class Console:
         if command == "map":
             return self._map()
         if command == "finish":
-            reach = reach_of(self.session, self.scenario)
-            finish_plan(self.session, reach, self.scenario)
+            reach = reach_of(self.session, self.scenario, progress_bar)
+            finish_plan(self.session, reach, self.scenario, progress_bar)
             return f"{self._share()}, {100 * reach.fraction:.1f} % are reachable"
         if command == "list":
             rows = [
@@ -173,12 +171,10 @@ def open_session(scenario: ResectionScenario, file: Path) -> Session:
     Raises:
         ScenarioError: If the file is damaged or the scenario makes no session.
     """
-    try:
+    with refusals():
         if file.exists():
             return load_session(file)
         session, _ = new_session(scenario)
-    except ValueError as error:
-        raise ScenarioError(str(error)) from error
     session.file = file
     session.save(file)
     return session

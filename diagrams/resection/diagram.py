@@ -8,11 +8,7 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.wiring import add_blocks, finish
-from diagrams.resection.scenario import (
-    ResectionScenario,
-    executed,
-    plan_operation,
-)
+from diagrams.resection.operation import Operation
 from diagrams.snake.diagram import DRUM_WIRES, WIRES
 from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
@@ -54,13 +50,12 @@ EXPORTS = {
 }
 
 
-def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
+def make_blocks(case: Operation) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
-    s = scenario
-    session = plan_operation(s).session
-    postures, done = session.postures, executed(s)
+    s, postures, done = case.scenario, case.session.postures, case.done
     start = postures[done.posture].tolist()
-    lengths = wound_lengths(start, s.inverse_actuation, s.snake, s.drive)
+    winding = replace(s.inverse_actuation, period=s.period)
+    lengths = wound_lengths(start, winding, s.snake, s.drive)
     return {
         "procedure_player": ProcedurePlayer(
             replace(s.player, lead=s.period), s.snake, postures, done.posture
@@ -69,29 +64,31 @@ def make_blocks(scenario: ResectionScenario) -> dict[str, Any]:
             replace(s.resection_ik, period=s.period), s.snake, start
         ),
         "wire_inverse_actuation": WireInverseActuation(
-            s.inverse_actuation, s.snake, s.drive
+            winding, s.snake, s.drive, start
         ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "wire_forward_actuation": WireForwardActuation(
+            s.snake, s.drive, s.period, start
+        ),
         "snake_location": SnakeLocation(s.snake),
         "wire_watch": WireWatch(replace(s.watch, period=s.period)),
         "wire_tension": WireTension(s.tension, s.snake),
         "tissue_carver": TissueCarver(
             replace(s.carver, period=s.period),
             s.snake,
-            Carving(session.volume, s.snake, done),
+            Carving(case.session.volume, s.snake, done),
             start,
         ),
     }
 
 
 def make_resection_diagram(
-    scenario: ResectionScenario, swaps: Mapping[str, Any] | None = None
+    case: Operation, swaps: Mapping[str, Any] | None = None
 ) -> Any:
-    """Plans a scenario and makes the diagram that carries the plan out.
+    """Makes the diagram that carries a plan out.
 
     Args:
-        scenario: The parameters.
+        case: The parameters and the plan.
         swaps: Systems that replace blocks of the same name and ports.
 
     Returns:
@@ -100,13 +97,13 @@ def make_resection_diagram(
     Raises:
         ValueError: If a parameter makes no sense, or a swap has no place.
     """
-    session = plan_operation(scenario).session
+    scenario, session = case.scenario, case.session
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     snake = add_snake(plant, plant.world_frame(), scenario.snake, scenario.drive)
     draw_channel(plant, plant.world_body(), session.volume.channel)
     plant.Finalize()
-    set_default_posture(plant, snake, session.postures[executed(scenario).posture])
-    blocks = add_blocks(builder, make_blocks(scenario), swaps)
+    set_default_posture(plant, snake, session.postures[case.done.posture])
+    blocks = add_blocks(builder, make_blocks(case), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
     return finish(builder, "resection", systems, RESECTION_WIRES, EXPORTS)

@@ -9,7 +9,6 @@ import numpy as np
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.resection.metrics import carving_of
 from diagrams.resection.replay import coarse, shown_spacing
-from diagrams.resection.scenario import plan_operation
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
@@ -55,7 +54,7 @@ def _equal(axes: Any, volume: Any) -> None:
 
 def figure8(run: Any) -> Figure:
     """Trajectory coloured by procedure, and the resected area beside it (Figure 8)."""
-    session = plan_operation(run.scenario).session
+    session = run.case.session
     volume = session.volume
     figure = new_figure(10.0, 5.2)
     left = add_axes(figure, 1, 2, 1, projection="3d", computed_zorder=False)
@@ -103,11 +102,10 @@ def _section(volume: Any, tau: np.ndarray, axis: int) -> np.ndarray:
 
 def report(run: Any) -> Figure:
     """One page: volumes, coverage, cuts before and after, timeline, what stayed."""
-    operation = plan_operation(run.scenario)
-    session, volume = operation.session, operation.session.volume
+    session, volume = run.case.session, run.case.session.volume
     tau = carving_of(run).volume.tau
     figure = new_figure(11.7, 8.3)
-    figure.suptitle(f"{run.scenario.description} ({operation.name})", fontsize=12)
+    figure.suptitle(f"{run.scenario.description} ({run.case.tumour})", fontsize=12)
     grid = figure.add_gridspec(3, 4, height_ratios=[1.0, 0.9, 0.9])
     size = np.array(volume.labels.shape) * volume.spacing
     for number, (axis, when) in enumerate(((1, 0), (1, 1), (0, 0), (0, 1))):
@@ -133,23 +131,24 @@ def report(run: Any) -> Figure:
         name = "xy"[across]
         axes.set(xlabel=f"{name} [mm]", ylabel="z [mm]" if number == 0 else "")
         axes.set_title(f"{name}z, {'after' if when else 'before'}")
-    _timeline(figure.add_subplot(grid[1, :]), run, session)
+    _timeline(figure.add_subplot(grid[1, :]), run)
     _gains(figure.add_subplot(grid[2, 0]), session)
     left = figure.add_subplot(grid[2, 1:3])
     left.axis("off")
     left.text(0, 1, _figures(run.metrics), va="top", fontsize=8.5, linespacing=1.45)
     right = figure.add_subplot(grid[2, 3])
     right.axis("off")
-    right.text(0, 1, _stayed(operation), va="top", fontsize=8.0, linespacing=1.4)
+    right.text(0, 1, _stayed(run.case), va="top", fontsize=8.0, linespacing=1.4)
     return figure
 
 
-def _timeline(axes: Any, run: Any, session: Any) -> None:
-    before = carving_of(run).done.time  # what an earlier run carried out
+def _timeline(axes: Any, run: Any) -> None:
+    session = run.case.session
+    before = run.case.done.time  # what an earlier run carried out
     time = before + run.signals["time"]
-    share = run.signals["tissue.removed.tumour"] / session.volume.tumour_volume
+    share = run.tissue.removed.tumour / session.volume.tumour_volume
     axes.plot(time / 60, 100 * share, color=COLORS["robot"], lw=1.6)
-    reach = 100 * plan_operation(run.scenario).reach.fraction
+    reach = 100 * run.case.reach.fraction
     axes.axhline(reach, color=COLORS["target"], lw=1.0, ls="--")
     station = run.diagram.GetSubsystemByName("station")
     times = (before + station.GetSubsystemByName("procedure_player").times) / 60
@@ -181,10 +180,11 @@ def _gains(axes: Any, session: Any) -> None:
 
 
 def _figures(m: dict[str, Any]) -> str:
-    critical = m["min_critical_distance"]
+    critical, mask = m["min_critical_distance"], m["mask_volume"]
     rows = [
         f"tumour {1e6 * m['tumour_volume']:.2f} cm³ (without the channel's cap of "
-        f"{1e6 * m['cap_volume']:.2f} cm³)",
+        f"{1e6 * m['cap_volume']:.2f} cm³)"
+        + (f", in the mask {1e6 * mask:.2f} cm³" if mask else ""),
         f"reachable {100 * m['reachable_fraction']:.1f} %, planned "
         f"{100 * m['planned_fraction']:.1f} %, resected "
         f"{100 * m['resected_fraction']:.1f} % of the tumour",
@@ -208,10 +208,10 @@ def _figures(m: dict[str, Any]) -> str:
     return "\n".join(rows)
 
 
-def _stayed(operation: Any) -> str:
-    volume = operation.session.volume
+def _stayed(case: Any) -> str:
+    volume = case.session.volume
     rows = ["what one entry cannot reach"]
-    for lump in operation.reach.lumps[:9]:
+    for lump in case.reach.lumps[:9]:
         share = 100 * lump.volume / volume.tumour_volume
         shown = f"{share:.1f} %" if share >= 0.1 else "< 0.1 %"
         rows.append(f"{1e9 * lump.volume:.0f} mm³ ({shown}): {lump.reason}")

@@ -6,7 +6,6 @@ import numpy as np
 from pydrake.geometry import Rgba
 
 from diagrams.resection.metrics import carving_of
-from diagrams.resection.scenario import plan_operation
 from plants.snake.last_module import meridian
 from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
@@ -34,11 +33,9 @@ def shown_spacing(volume: Any) -> int:
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The tumour in blocks whose visibility is animated, the vessel, Figure 7."""
-    operation = plan_operation(run.scenario)
-    volume = operation.session.volume
-    carving = carving_of(run)
-    tau, first = carving.volume.tau, carving.done.index
-    moves = float(run.signals["tissue.index"][-1]) - first
+    volume = run.case.session.volume
+    tau, first = carving_of(run).volume.tau, run.case.done.index
+    moves = float(run.tissue.index.number[-1]) - first
     end = float(run.signals["time"][-1]) / run.replay_speed
     every = shown_spacing(volume)
     spacing = every * volume.spacing
@@ -71,7 +68,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
             coarse(volume.labels == CRITICAL, 1), volume.origin, volume.spacing
         )
         meshcat.SetTriangleMesh("vessel", vertices.T, faces.T, VESSEL)
-    _elementary_volumes(meshcat, animation, run, operation)
+    _elementary_volumes(meshcat, animation, run)
     # The study's view shows 6 cm; a smaller tumour is looked at from nearer.
     view = run.study.view
     nearer = min(1.0, float(np.ptp(volume.points(tissue), axis=0).max()) / 0.055)
@@ -124,16 +121,16 @@ def dome(
     return points.reshape(-1, 3), faces.reshape(-1, 3)
 
 
-def _elementary_volumes(meshcat: Any, animation: Any, run: Any, operation: Any) -> None:
+def _elementary_volumes(meshcat: Any, animation: Any, run: Any) -> None:
     """Each elementary procedure's first volume, while it is carried out."""
-    session = operation.session
+    session = run.case.session
     player = run.diagram.GetSubsystemByName("station")
     times = player.GetSubsystemByName("procedure_player").times / run.replay_speed
     params = session.params
     for number, step in enumerate(session.steps):
         if step.kind not in ("elementary", "volume") or step.procedure is None:
             continue
-        if step.last <= carving_of(run).done.posture:
+        if step.last <= run.case.done.posture:
             continue  # carried out before this run
         n = step.procedure.axis()
         ahead = params.straight_module + params.tool_offset

@@ -75,8 +75,7 @@ CHANNEL_CLEARANCE = 1.0e-3
 
 def start_posture(scenario: SnakeScenario) -> list[float]:
     """The posture (7) that the tip's reference begins with."""
-    v = reference(scenario.tip, 0.0)
-    return tool_postures(v[:3], v[3:6], v[6:], scenario.snake).x.tolist()
+    return tool_postures(*reference(scenario.tip, 0.0), scenario.snake).x.tolist()
 
 
 def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
@@ -84,7 +83,7 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
     s = scenario
     elastic = s.wires == "elastic"
     posture = start_posture(s)
-    winding = s.inverse_actuation
+    winding = replace(s.inverse_actuation, period=s.period)
     if elastic:
         winding = replace(winding, stiffness=s.drive.wire_stiffness)
     lengths = wound_lengths(posture, winding, s.snake, s.drive)
@@ -93,9 +92,13 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, posture
         ),
-        "wire_inverse_actuation": WireInverseActuation(winding, s.snake, s.drive),
+        "wire_inverse_actuation": WireInverseActuation(
+            winding, s.snake, s.drive, posture
+        ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "wire_forward_actuation": WireForwardActuation(
+            s.snake, s.drive, s.period, posture
+        ),
         "snake_location": SnakeLocation(s.snake),
         "wire_watch": WireWatch(replace(s.watch, period=s.period)),
     }

@@ -13,6 +13,7 @@ from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import WIRES, SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.wire_path import hanging_points, tangent_points
+from systems.common.parameter import check
 
 _TURN = np.linspace(0.0, 2 * np.pi, 49)
 
@@ -94,7 +95,7 @@ def module_figure(
     Raises:
         ValueError: If beta is beyond its limit.
     """
-    params = (params or SnakeParams()).check()
+    params = check(params or SnakeParams())
     if not 0.0 <= beta <= params.max_bend + 1e-9:
         raise ValueError(
             f"beta={beta:.4f} rad is outside [0, max_bend={params.max_bend:.4f}] rad; "
@@ -179,7 +180,7 @@ def workspace_figure(
     Returns:
         The figure, and the volumes in m3 with 1, 2 and 3 modules.
     """
-    params = (params or SnakeParams()).check()
+    params = check(params or SnakeParams())
     figure = new_figure(7.0, 4.6)
     axes = add_axes(figure, 1, 1, 1)
     volumes = []

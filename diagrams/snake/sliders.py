@@ -13,6 +13,7 @@ from plants.snake.kinematics import centreline
 from plants.snake.looks import BRASS, PLATE, SWEPT
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array, posture_of
+from systems.common.parameter import check
 
 
 def show_snake(meshcat: Any, x: Array, params: SnakeParams | None = None) -> Array:
@@ -26,7 +27,7 @@ def show_snake(meshcat: Any, x: Array, params: SnakeParams | None = None) -> Arr
     Returns:
         Lengths of wires 0 to 8 in m, (9,).
     """
-    params = (params or SnakeParams()).check()
+    params = check(params or SnakeParams())
     points = centreline(x, params)
     plate = Cylinder(params.body_radius, params.plate_thickness)
     for i in range(7):
@@ -60,7 +61,7 @@ def bend_with_sliders(
     Returns:
         The last posture, (7,).
     """
-    params = (params or SnakeParams()).check()
+    params = check(params or SnakeParams())
     limits = {"alpha": (-np.pi, np.pi), "beta": (0.0, params.max_bend)}
     sliders = [f"{angle}{k}" for k in (1, 2, 3) for angle in limits]
     for path in ("/Grid", "/Axes"):

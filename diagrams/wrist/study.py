@@ -3,20 +3,22 @@
 from typing import Any
 
 from diagrams.bedside.bedside import stiffen
-from diagrams.bedside.wrist import WRIST_SIGNALS
+from diagrams.bedside.wrist import WRIST_SIGNALS, check_wrist
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
 from diagrams.wrist.diagram import make_wrist_diagram
 from diagrams.wrist.plots import plots
-from diagrams.wrist.scenario import WristScenario, check
+from diagrams.wrist.scenario import WristScenario, companions
+from plants.abdomen.wall_force import FulcrumError
+from systems.common.signals import Force, RobotTool
+from systems.motion.joint_commands import Status
 
-XYZ = ("x", "y", "z")
-SIGNALS: dict[str, tuple[str, ...]] = WRIST_SIGNALS | {
-    "robot.tool": (*(f"fulcrum_{axis}" for axis in XYZ), "tip_x", "tip_y", "tip_z"),
-    "joints.status": ("code",),
-    "wall.force": XYZ,
-    "wall.fulcrum_error": ("distance",),
+SIGNALS = WRIST_SIGNALS | {
+    "robot.tool": RobotTool,
+    "joints.status": Status,
+    "wall.force": Force,
+    "wall.fulcrum_error": FulcrumError,
 }
 
 
@@ -28,15 +30,16 @@ def measure(run: Any) -> dict[str, Any]:
 STUDY = Study(
     name="wrist",
     scenario=WristScenario,
-    make_diagram=make_wrist_diagram,
-    check=check,
+    make_diagram=lambda case: make_wrist_diagram(case.scenario),
+    check=check_wrist,
     measure=measure,
-    signals=SIGNALS,
+    signals=lambda scenario: SIGNALS,
     log_period=1.0 / 120.0,
     plots=plots,
     decorate=decorate_wrist,
     controller="passive_wrist",
     adjust=stiffen,
+    companions=companions,
     required=("system", "duration", "wrist", "robot.p_WG", "robot.p_WP"),
     view=View(camera=(0.3, -0.42, 0.14), target=(0.0, 0.0, 0.0)),
 )

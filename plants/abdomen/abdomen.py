@@ -29,6 +29,7 @@ from pydrake.multibody.tree import (
 
 from plants.abdomen.skin import draw_skin
 from plants.common.looks import TROCAR, draw
+from systems.common.parameter import check, parameter
 
 _SEAL_VISCOSITY = 1e4
 """Slope of the seal's friction about zero speed, in N s/m: full friction is reached
@@ -37,46 +38,26 @@ at 0.1 mm/s per newton."""
 
 @dataclass
 class AbdomenParams:
-    """Wall, sleeve and trocar spring.
+    """Wall, sleeve and trocar spring."""
 
-    Attributes:
-        stiffness: K, lateral stiffness of the trocar, in N/m.
-        damping: D, in N s/m. Over 10, CENIC needs more steps, or a heavier sleeve.
-        seal_friction: Dry friction along the shaft, in N; 0 for none.
-        seal_viscosity: Friction along the shaft that grows with speed, in N s/m.
-        sleeve_mass: In kg. Light, for the sensor feels its inertia; below 20 g the
-            sleeve on a stiff trocar makes CENIC halve its steps.
-        wall_mass: In kg.
-        wall_stiffness: Of the servos that place the wall, in N/m.
-    """
-
-    stiffness: float = 500.0
-    damping: float = 5.0
-    seal_friction: float = 0.5
-    seal_viscosity: float = 2.0
-    sleeve_mass: float = 0.02
-    wall_mass: float = 0.5
-    wall_stiffness: float = 2e5
-
-    def check(self) -> None:
-        """Raises ValueError for a value that cannot be."""
-        bounds = {
-            "stiffness": (1.0, 1e5),
-            "damping": (0.0, 100.0),
-            "seal_friction": (0.0, 20.0),
-            "seal_viscosity": (0.0, 100.0),
-            "sleeve_mass": (0.005, 0.2),
-            "wall_mass": (0.05, 10.0),
-            "wall_stiffness": (1e3, 1e6),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                nearest = low if not value > low else high
-                raise ValueError(
-                    f"abdomen.{name}={value} must be in [{low}, {high}]; "
-                    f"nearest {nearest}"
-                )
+    stiffness: float = parameter(
+        500.0, "K, lateral, of the trocar; 100 to 3000", "N/m", least=10, most=2e4
+    )
+    # Over 10, CENIC needs more steps, or a heavier sleeve.
+    damping: float = parameter(5.0, "D", "N s/m", least=0, most=100)
+    seal_friction: float = parameter(
+        0.5, "dry friction along the shaft; 0 for none", "N", least=0, most=20
+    )
+    seal_viscosity: float = parameter(
+        2.0, "friction along the shaft with speed", "N s/m", least=0, most=100
+    )
+    # Light, for the sensor feels its inertia; below 20 g the sleeve on a stiff trocar
+    # makes CENIC halve its steps.
+    sleeve_mass: float = parameter(0.02, "of it alone", "kg", least=0.005, most=0.2)
+    wall_mass: float = parameter(0.5, "that the servos move", "kg", least=0.05, most=10)
+    wall_stiffness: float = parameter(
+        2e5, "of the servos that place the wall", "N/m", least=1e3, most=1e6
+    )
 
 
 @dataclass
@@ -129,7 +110,7 @@ def add_abdomen(
         ValueError: If a parameter cannot be or the fulcrum is not finite.
     """
     params = params or AbdomenParams()
-    params.check()
+    check(params)
     if len(p_PG) != 3 or not all(math.isfinite(x) for x in p_PG):
         raise ValueError(f"abdomen: p_PG={list(p_PG)} must be three finite numbers")
     wall_instance = plant.AddModelInstance("wall")

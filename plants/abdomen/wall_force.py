@@ -4,21 +4,33 @@ For metrics, plots and tests; no controller may look at it.
 """
 
 from collections.abc import Callable
-import math
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
+import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
-from pydrake.systems.framework import LeafSystem, ValueProducer
 
 from plants.abdomen.abdomen import Abdomen
+from systems.common.block import Block
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import across, along, norm, scaled, sub, xyz
+from systems.common.signal import Field, Vector, writer
+from systems.common.signals import Force, MovingPoint
 
-Vector = tuple[float, float, float]
+
+class FulcrumError(NamedTuple):
+    """How far the shaft passes the true fulcrum."""
+
+    distance: Annotated[float, Field("m", "of its line from the fulcrum", 1e-3)]
 
 
+write_force = writer(Force)
+
+
+@compiled
 def lateral_force(
-    p: Vector, u: Vector, v: Vector, stiffness: float, damping: float
+    p: Numbers, u: Numbers, v: Numbers, stiffness: float, damping: float
 ) -> tuple[Vector, float]:
     """Force of the wall on a shaft, across the shaft.
 
@@ -33,29 +45,25 @@ def lateral_force(
         K p_perp + D v_perp in N, and |p_perp|, the distance of the shaft's line
         from the fulcrum, in m.
     """
-    along_p = p[0] * u[0] + p[1] * u[1] + p[2] * u[2]
-    along_v = v[0] * u[0] + v[1] * u[1] + v[2] * u[2]
-    px, py, pz = (a - along_p * b for a, b in zip(p, u, strict=True))
-    vx, vy, vz = (a - along_v * b for a, b in zip(v, u, strict=True))
-    force = (
-        stiffness * px + damping * vx,
-        stiffness * py + damping * vy,
-        stiffness * pz + damping * vz,
-    )
-    return force, math.sqrt(px * px + py * py + pz * pz)
+    p_perp = across(p, u)
+    return along(scaled(stiffness, p_perp), damping, across(v, u)), norm(p_perp)
 
 
-class WallForce(LeafSystem):
+@compiled
+def _lever(p_WI: Numbers, p_WC: Numbers, R_WC: np.ndarray) -> tuple[Vector, Vector]:
+    return sub(p_WI, p_WC), xyz(R_WC[:, 2], 0)
+
+
+class WallForce(Block):
     """Reads the wall's force and the fulcrum's error from the plant's bodies.
 
     Port ``body_poses`` accepts the plant's `body_poses`, port
     ``body_spatial_velocities`` the plant's output of that name.
-    Port ``force`` emits the true force of the wall on the shaft, across the shaft,
-    in N, world frame (3). The sleeve's own inertia and the bushing's turning rate
-    are left out (20 g, and D times millimetres per second).
-    Port ``fulcrum_error`` emits the distance of the shaft's line from the true
-    fulcrum in m (1).
-    Port ``fulcrum`` emits the true fulcrum p_WI in m and its velocity in m/s (6).
+    Port ``force`` emits the true `Force` of the wall on the shaft, across the shaft.
+    The sleeve's own inertia and the bushing's turning rate are left out (20 g, and D
+    times millimetres per second).
+    Port ``fulcrum_error`` emits the `FulcrumError`.
+    Port ``fulcrum`` emits the true fulcrum p_WI, a `MovingPoint`.
     """
 
     def __init__(
@@ -71,65 +79,47 @@ class WallForce(LeafSystem):
         self._factor = factor
         self._wall = int(abdomen.wall.index())
         self._sleeve = int(abdomen.sleeve.index())
-        self._stiffness = abdomen.params.stiffness
-        self._damping = abdomen.params.damping
+        self._stiffness = float(abdomen.params.stiffness)
+        self._damping = float(abdomen.params.damping)
         self._poses = self.DeclareAbstractInputPort(
             "body_poses", Value([RigidTransform()])
         )
         self._velocities = self.DeclareAbstractInputPort(
             "body_spatial_velocities", Value([SpatialVelocity()])
         )
-        self._lever = self.DeclareCacheEntry(
-            "lever",
-            ValueProducer(
-                allocate=lambda: Value(object()),
-                calc=lambda context, value: value.set_value(self._calc_lever(context)),
-            ),
-            {self._poses.ticket()},
-        )
-        self.DeclareVectorOutputPort(
-            "force",
-            3,
-            self._calc_force,
-            {self._poses.ticket(), self._velocities.ticket(), self.time_ticket()},
-        )
-        self.DeclareVectorOutputPort(
-            "fulcrum_error", 1, self._calc_error, {self._poses.ticket()}
-        )
-        self.DeclareVectorOutputPort(
-            "fulcrum",
-            6,
-            self._calc_fulcrum,
-            {self._poses.ticket(), self._velocities.ticket()},
-        )
+        standing = {self._poses.ticket()}
+        moving = standing | {self._velocities.ticket()}
+        self._lever = self.cached("lever", self._calc_lever, standing)
+        self.signal_out("force", Force, self._calc_force, moving | {self.time_ticket()})
+        self.signal_out("fulcrum_error", FulcrumError, self._calc_error, standing)
+        self.signal_out("fulcrum", MovingPoint, self._calc_fulcrum, moving)
 
     def _calc_lever(self, context: Any) -> tuple[Vector, Vector]:
         """From the sleeve to the fulcrum, and the shaft's axis, in W."""
         poses = self._poses.Eval(context)
-        sleeve = poses[self._sleeve]
-        p = poses[self._wall].translation() - sleeve.translation()
-        return p.tolist(), sleeve.rotation().col(2).tolist()
-
-    def _calc_force(self, context: Any, output: Any) -> None:
-        velocities = self._velocities.Eval(context)
-        v = (
-            velocities[self._wall].translational()
-            - velocities[self._sleeve].translational()
+        wall, sleeve = poses[self._wall], poses[self._sleeve]
+        return _lever(
+            wall.translation(), sleeve.translation(), sleeve.rotation().matrix()
         )
+
+    def _calc_force(self, context: Any) -> np.ndarray:
+        velocities = self._velocities.Eval(context)
+        wall, sleeve = velocities[self._wall], velocities[self._sleeve]
+        v = wall.translational() - sleeve.translational()
         p, u = self._lever.Eval(context)
         stiffness = self._stiffness * self._factor(context.get_time())
-        force, _ = lateral_force(p, u, v.tolist(), stiffness, self._damping)
-        output.SetFromVector(force)
+        force, _ = lateral_force(p, u, v, stiffness, self._damping)
+        return write_force(Force(force))
 
-    def _calc_error(self, context: Any, output: Any) -> None:
+    def _calc_error(self, context: Any) -> list[float]:
         p, u = self._lever.Eval(context)
-        _, error = lateral_force(p, u, (0.0, 0.0, 0.0), 0.0, 0.0)
-        output.SetFromVector([error])
+        _, error = lateral_force(p, u, np.zeros(3), 0.0, 0.0)
+        return [error]
 
-    def _calc_fulcrum(self, context: Any, output: Any) -> None:
+    def _calc_fulcrum(self, context: Any) -> np.ndarray:
         p_WI = self._poses.Eval(context)[self._wall].translation()
         v_WI = self._velocities.Eval(context)[self._wall].translational()
-        output.SetFromVector([*p_WI, *v_WI])
+        return np.concatenate([p_WI, v_WI])
 
 
 def add_wall_force(

@@ -6,7 +6,7 @@ with I:E 1:1.5 is usual under a ventilator; how far a trocar moves with it was n
 found: sweep 2 to 10 mm.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import cos, exp, pi, sin, sqrt
 from typing import Any
 
@@ -16,65 +16,44 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from plants.abdomen.abdomen import Abdomen
 from plants.common.actuation import hold_still
+from systems.common.parameter import check, parameter
 
 _INSPIRATION = 0.4  # share of a breath, I:E 1:1.5
 _EXPIRATION = 0.05  # time constant of the passive expiration, share of a breath
 _KNOT = 1.0 / 30.0  # [s]
 
 
+WAVES = ("sine", "ventilator")
+
+
 @dataclass
 class WallMotionParams:
-    """Motion of the wall at the fulcrum; vectors in W, all zero is a still wall.
+    """Motion of the wall at the fulcrum; vectors in W, all zero is a still wall."""
 
-    Attributes:
-        breathing: Amplitude in m: the wall moves by plus and minus this.
-        rate: Of the breathing, in Hz.
-        wave: `sine`, or `ventilator` (smooth in, sharp out).
-        phase: Of the breathing at the start, in breaths.
-        step: Sudden displacement, in m.
-        step_time: When, in s.
-        rise: Slow displacement of an insufflation, in m.
-        rise_time: When it begins, in s.
-        rise_duration: In s.
-        stiffening: Relative growth of the trocar's stiffness with it.
-    """
-
-    breathing: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    rate: float = 0.2
-    wave: str = "sine"
-    phase: float = 0.0
-    step: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    step_time: float = 0.0
-    rise: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
-    rise_time: float = 0.0
-    rise_duration: float = 5.0
-    stiffening: float = 0.0
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name in ("breathing", "step", "rise"):
-            vector = getattr(self, name)
-            if len(vector) != 3 or not all(abs(x) <= 0.05 for x in vector):
-                raise ValueError(
-                    f"wall_motion.{name}={vector}: expected 3 numbers of at most 0.05 m"
-                )
-        if not 0.05 <= self.rate <= 1.0:
-            raise ValueError(
-                f"wall_motion.rate={self.rate} Hz: expected in [0.05, 1]; "
-                "0.15 to 0.35 is usual"
-            )
-        if self.wave not in ("sine", "ventilator"):
-            raise ValueError(
-                f"wall_motion.wave={self.wave!r}: expected 'sine' or 'ventilator'"
-            )
-        if not self.rise_duration > 0.0:
-            raise ValueError(
-                f"wall_motion.rise_duration={self.rise_duration} s: expected > 0"
-            )
-        if not -0.9 <= self.stiffening <= 10.0:
-            raise ValueError(
-                f"wall_motion.stiffening={self.stiffening}: expected in [-0.9, 10]"
-            )
+    # The wall moves by plus and minus this.
+    breathing: list[float] = parameter(
+        [0.0, 0.0, 0.0], "its amplitude", "m", least=-0.05, most=0.05, shape=(3,)
+    )
+    rate: float = parameter(
+        0.2, "of the breathing; 0.15 to 0.35 is usual", "Hz", least=0.05, most=1
+    )
+    # The ventilator's is smooth in, sharp out.
+    wave: str = parameter("sine", "of the breathing", choices=WAVES)
+    phase: float = parameter(
+        0.0, "of the breathing at the start, in breaths", least=-1, most=1
+    )
+    step: list[float] = parameter(
+        [0.0, 0.0, 0.0], "sudden displacement", "m", least=-0.05, most=0.05, shape=(3,)
+    )
+    step_time: float = parameter(0.0, "when it steps", "s", least=0, most=1e4)
+    rise: list[float] = parameter(
+        [0.0, 0.0, 0.0], "by an insufflation", "m", least=-0.05, most=0.05, shape=(3,)
+    )
+    rise_time: float = parameter(0.0, "when the rise begins", "s", least=0, most=1e4)
+    rise_duration: float = parameter(5.0, "of the rise", "s", above=0, most=1e4)
+    stiffening: float = parameter(
+        0.0, "relative growth of the stiffness in the rise", least=-0.9, most=10
+    )
 
     @property
     def still(self) -> bool:
@@ -133,7 +112,7 @@ def add_wall_motion(
     Raises:
         ValueError: If a parameter makes no sense.
     """
-    params.check()
+    check(params)
     if params.still:
         hold_still(builder, plant, abdomen.wall_instance)
         return

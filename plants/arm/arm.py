@@ -6,8 +6,7 @@ The joint servos are Drake's PD actuators, so that they are part of the continuo
 dynamics.
 """
 
-from dataclasses import dataclass, field
-import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
 
 from plants.arm.parameters import BASE_POSITION, FRICTION, JOINTS
 from plants.common.models import add_model
+from systems.common.parameter import check, parameter
 
 
 @dataclass
@@ -28,31 +28,24 @@ class ArmParams:
     what they lag then cancels in the wrist. In the postures that the trocar allows,
     every joint has at least 14 Hz of bandwidth and every mode a damping ratio over
     0.55.
-
-    Attributes:
-        kp: Stiffness of each joint in Nm/rad.
-        kd: Damping of each joint in Nm s/rad, on top of the joint's friction.
     """
 
-    kp: list[float] = field(default_factory=lambda: [1e5, 1e5, 4e4, 4e4, 3e3, 3e3, 1e3])
-    kd: list[float] = field(
-        default_factory=lambda: [1090.0, 1090.0, 435.0, 435.0, 31.0, 31.0, 9.0]
+    kp: list[float] = parameter(
+        [1e5, 1e5, 4e4, 4e4, 3e3, 3e3, 1e3],
+        "stiffness of each joint",
+        "N m/rad",
+        above=0,
+        most=1e6,
+        shape=(JOINTS,),
     )
-
-    def check(self) -> None:
-        """Raises ValueError unless all 14 gains are positive and finite."""
-        for name in ("kp", "kd"):
-            gains = getattr(self, name)
-            if len(gains) != JOINTS:
-                raise ValueError(
-                    f"arm.{name} has {len(gains)} gains, expected {JOINTS}"
-                )
-            for i, gain in enumerate(gains):
-                if not (math.isfinite(gain) and gain > 0.0):
-                    raise ValueError(
-                        f"arm.{name}[{i}]={gain} must be > 0; "
-                        f"the default is {getattr(ArmParams(), name)[i]}"
-                    )
+    kd: list[float] = parameter(
+        [1090.0, 1090.0, 435.0, 435.0, 31.0, 31.0, 9.0],
+        "damping of each joint, on top of its friction",
+        "N m s/rad",
+        above=0,
+        most=1e5,
+        shape=(JOINTS,),
+    )
 
 
 def add_arm(
@@ -81,7 +74,7 @@ def add_arm(
         ValueError: If a gain is not positive.
     """
     params = params or ArmParams()
-    params.check()
+    check(params)
     instance = add_model(plant, Path(__file__).parent, "pa10.urdf")
     plant.WeldFrames(
         parent or plant.world_frame(),
@@ -127,7 +120,7 @@ class SetPoint:
             ValueError: If a gain is not positive or the period is negative.
         """
         params = params or ArmParams()
-        params.check()
+        check(params)
         if not period >= 0.0:
             raise ValueError(f"SetPoint: period={period} s must be >= 0")
         kp = np.array(params.kp)

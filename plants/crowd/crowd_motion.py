@@ -6,13 +6,17 @@ start on a circle, walk to the opposite point by ORCA, and do not see the robot.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, hypot, isfinite, pi, sin
+from math import cos, hypot, pi, sin
 import random
 from typing import Any
 
+import numpy as np
+
 from plants.crowd.orca import orca_towards
+from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle, filled
 from systems.common.block import Block
-from systems.switching.signals import CAPACITY
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import size
 
 PERIOD = 0.25
 """Of everyone's decisions [s]."""
@@ -20,42 +24,30 @@ PERIOD = 0.25
 
 @dataclass
 class CrowdParams:
-    """A crowd."""
+    """A crowd; everyone is alike."""
 
-    # How many people; none by default.
-    people: int = 0
-    # Radius of a person [m].
-    radius: float = 0.3
-    # Greatest speed of a person [m/s].
-    speed: float = 0.4
-    # Radius of the circle they start on [m], and its centre [m].
-    circle: float = 4.0
-    x: float = 0.0
-    y: float = 0.0
-    # Seed of the starts.
-    seed: int = 1
+    people: int = parameter(0, "how many there are", least=0, most=CAPACITY)
+    radius: float = parameter(0.3, "of a person", "m", least=0.05, most=1.0)
+    speed: float = parameter(0.4, "a person's greatest", "m/s", above=0.0, most=3.0)
+    circle: float = parameter(
+        4.0, "radius of the circle they start on", "m", least=1.0, most=50.0
+    )
+    x: float = parameter(0.0, "of the circle's centre", "m", least=-100.0, most=100.0)
+    y: float = parameter(0.0, "of the circle's centre", "m", least=-100.0, most=100.0)
+    seed: int = parameter(1, "of the starts", least=0, most=2**31 - 1)
 
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: If one is out of range; tells the range.
-        """
-        if self.people < 0:
-            raise ValueError(f"crowd: people={self.people} must be >= 0")
-        for name in ("radius", "speed", "circle"):
-            value = getattr(self, name)
-            if not (value > 0.0 and isfinite(value)):
-                raise ValueError(f"crowd: {name}={value} must be positive")
-        if self.people * 2.8 * self.radius > 2.0 * pi * self.circle:
-            most = int(2.0 * pi * self.circle / (2.8 * self.radius))
-            raise ValueError(
-                f"crowd: people={self.people} do not fit on the circle; nearest {most}"
-            )
+    def rules(self) -> Rules:
+        """They must fit on their circle."""
+        most = int(2.0 * pi * self.circle / (2.8 * self.radius))
+        yield self.people <= most, "people", f"<= {most}: no more fit on the circle"
 
 
-def starts(params: CrowdParams) -> list[tuple[float, float]]:
-    """Where everyone starts [m], clear of each other and of the lowest point."""
+def starts(params: CrowdParams) -> list[Obstacle]:
+    """Everyone at the start, clear of each other and of the lowest point.
+
+    Raises:
+        ValueError: If no room is found for everyone.
+    """
     rng = random.Random(params.seed)
     clear = 2.0 * params.radius + 0.2
     places = [(0.0, -params.circle)]  # the robot's, by custom
@@ -63,7 +55,7 @@ def starts(params: CrowdParams) -> list[tuple[float, float]]:
     while len(places) <= params.people:
         tries += 1
         if tries > 20_000:
-            raise ValueError(f"crowd: no room for people={params.people}")
+            raise ValueError(f"crowd.people={params.people}: no room for all of them")
         angle = rng.uniform(0.0, 2.0 * pi)
         x = params.circle * cos(angle) + rng.uniform(-0.5, 0.5)
         y = params.circle * sin(angle) + rng.uniform(-0.5, 0.5)
@@ -72,68 +64,56 @@ def starts(params: CrowdParams) -> list[tuple[float, float]]:
             for a, b in places
         ):
             places.append((x, y))
-    return [(params.x + x, params.y + y) for x, y in places[1:]]
+    return [
+        Obstacle(params.x + x, params.y + y, params.radius, 0.0, 0.0)
+        for x, y in places[1:]
+    ]
 
 
 class CrowdMotion(Block):
     """Moves a crowd by ORCA; the robot is invisible to it.
 
-    Port ``obstacles`` emits x, y, radius, v_x, v_y of each person, world frame
-    (5 each; radius zero for none).
+    Port ``obstacles`` emits everyone, rows of `Obstacle`.
     """
 
-    def __init__(
-        self, params: CrowdParams | None = None, capacity: int = CAPACITY
-    ) -> None:
+    def __init__(self, params: CrowdParams | None = None) -> None:
         """Makes the block.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
+            ValueError: If the circle has no room for the crowd.
         """
         super().__init__()
         self.params = params or CrowdParams(people=3)
-        self.params.check()
-        if self.params.people > capacity:
-            raise ValueError(
-                f"crowd: people={self.params.people}: expected at most {capacity}"
-            )
-        self._capacity = capacity
-        places = starts(self.params)
-        centre = (2.0 * self.params.x, 2.0 * self.params.y)
-        self.goals = [(centre[0] - x, centre[1] - y) for x, y in places]
-        # Time of the last decision, then x, y, v_x, v_y of everyone at that time.
-        state = [0.0]
-        for x, y in places:
-            state += [x, y, 0.0, 0.0]
-        self._state = self.DeclareDiscreteState(state)
-        self.vector_out(
+        check(self.params)
+        people = starts(self.params)
+        x, y = 2.0 * self.params.x, 2.0 * self.params.y
+        self.goals = [(x - o.x, y - o.y) for o in people]
+        self._decided = self.DeclareDiscreteState([0.0])
+        self._people = self.DeclareDiscreteState(np.ravel(people))
+        self.signal_out(
             "obstacles",
-            5 * capacity,
-            self._calc_obstacles,
+            OBSTACLES,
+            lambda context: filled(self._now(context)),
             {self.xd_ticket(), self.time_ticket()},
         )
         self.update_every(PERIOD, self._update)
 
-    def _now(self, context: Any) -> list[tuple[float, float, float, float, float]]:
-        """x, y, v_x, v_y, radius of everyone at the context's time."""
-        held = context.get_discrete_state(self._state).value().tolist()
-        dt = context.get_time() - held[0]
-        people = []
-        for k in range(1, len(held), 4):
-            x, y, vx, vy = held[k : k + 4]
-            people.append((x + dt * vx, y + dt * vy, vx, vy, self.params.radius))
-        return people
+    def _now(self, context: Any) -> list[Obstacle]:
+        """Everyone at the context's time, straight on since the last decision."""
+        state = context.get_discrete_state
+        dt = context.get_time() - state(self._decided).value().item()
+        table = state(self._people).value().reshape(-1, size(Obstacle))
+        return [
+            Obstacle(x + dt * v_x, y + dt * v_y, radius, v_x, v_y)
+            for x, y, radius, v_x, v_y in table.tolist()
+        ]
 
-    def _calc_obstacles(self, context: Any) -> Sequence[float]:
-        rows: list[float] = []
-        for x, y, vx, vy, radius in self._now(context):
-            rows += [x, y, radius, vx, vy]
-        return rows + [0.0] * (5 * self._capacity - len(rows))
-
-    def _update(self, context: Any) -> Sequence[float]:
+    def _update(self, context: Any) -> Sequence[Any]:
         people = self._now(context)
         moves = orca_towards(people, self.goals, self.params.speed, 5.0, PERIOD)
-        state = [context.get_time()]
-        for (x, y, _, _, _), (vx, vy) in zip(people, moves, strict=True):
-            state += [x, y, vx, vy]
-        return state
+        turned = [
+            person._replace(v_x=v_x, v_y=v_y)
+            for person, (v_x, v_y) in zip(people, moves, strict=True)
+        ]
+        return np.array([context.get_time()]), np.ravel(turned)

@@ -11,8 +11,7 @@ that violates the worst half-plane least.
 from collections.abc import Sequence
 from math import hypot, sqrt
 
-Disc = tuple[float, float, float, float, float]
-"""x, y, v_x, v_y [m, m/s] and radius [m] of an agent."""
+from plants.crowd.signals import Obstacle
 
 Line = tuple[float, float, float, float]
 """A half-plane: point and unit direction; velocities on its left are allowed."""
@@ -20,7 +19,7 @@ Line = tuple[float, float, float, float]
 _EPSILON = 1e-5
 
 
-def half_plane(agent: Disc, other: Disc, tau: float, dt: float) -> Line:
+def half_plane(agent: Obstacle, other: Obstacle, tau: float, dt: float) -> Line:
     """The velocities that `agent` may take as its half of avoiding `other`.
 
     Args:
@@ -29,8 +28,8 @@ def half_plane(agent: Disc, other: Disc, tau: float, dt: float) -> Line:
         tau: Time [s] for which the pair must stay apart.
         dt: Time [s] in which discs that overlap must separate.
     """
-    x, y, vx, vy, r = agent
-    qx, qy, wx, wy, s = other
+    x, y, r, vx, vy = agent
+    qx, qy, s, wx, wy = other
     px, py = qx - x, qy - y
     ux, uy = vx - wx, vy - wy
     radius = r + s
@@ -152,8 +151,8 @@ def _least_violation(
 
 
 def orca_velocity(
-    agent: Disc,
-    neighbours: Sequence[Disc],
+    agent: Obstacle,
+    neighbours: Sequence[Obstacle],
     preferred: tuple[float, float],
     speed: float,
     tau: float = 5.0,
@@ -177,7 +176,7 @@ def orca_velocity(
 
 
 def orca_towards(
-    agents: Sequence[Disc],
+    agents: Sequence[Obstacle],
     goals: Sequence[tuple[float, float]],
     speed: float,
     tau: float = 5.0,
@@ -197,17 +196,17 @@ def orca_towards(
         dt: Time step [s].
         margin: Added to each radius [m].
     """
-    grown = [(x, y, vx, vy, r + margin) for x, y, vx, vy, r in agents]
+    grown = [Obstacle(x, y, r + margin, vx, vy) for x, y, r, vx, vy in agents]
     chosen = []
-    for i, me in enumerate(grown):
-        ax, ay = me[0], me[1]
+    for i, (me, (goal_x, goal_y)) in enumerate(zip(grown, goals, strict=True)):
+        ax, ay = me.x, me.y
         near = [
             (squared, j)
             for j, (x, y, _, _, _) in enumerate(grown)
             if j != i and (squared := (x - ax) ** 2 + (y - ay) ** 2) < 100.0
         ]
         near.sort()
-        gx, gy = goals[i][0] - ax, goals[i][1] - ay
+        gx, gy = goal_x - ax, goal_y - ay
         distance = hypot(gx, gy)
         if distance > 1.0:
             gx, gy = gx / distance, gy / distance

@@ -21,46 +21,25 @@ from pydrake.multibody.tree import (
 )
 
 from plants.common.looks import DARK, GAUZE, STEEL, draw
+from systems.common.parameter import check, parameter
 
 
 @dataclass
 class InstrumentParams:
-    """Dimensions and masses of the instrument.
+    """Dimensions and masses of the instrument."""
 
-    Attributes:
-        length: From the sensor to the tip, in m.
-        diameter: Of the shaft, in m.
-        mount_length: Of the part that the sensor carries the shaft with, in m.
-        mount_mass: In kg.
-        shaft_mass: In kg.
-        gauze_mass: Of the gauze at the tip, in kg (wet, about 0.02).
-    """
-
-    length: float = 0.40
-    diameter: float = 0.005
-    mount_length: float = 0.06
-    mount_mass: float = 0.16
-    shaft_mass: float = 0.04
-    gauze_mass: float = 0.0
-
-    def check(self) -> None:
-        """Raises ValueError for a dimension or mass that cannot be."""
-        bounds = {
-            "length": (0.20, 0.45),
-            "diameter": (0.003, 0.010),
-            "mount_length": (0.02, 0.10),
-            "mount_mass": (0.01, 1.0),
-            "shaft_mass": (0.005, 0.5),
-            "gauze_mass": (0.0, 0.1),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                nearest = low if not value > low else high
-                raise ValueError(
-                    f"instrument.{name}={value} must be in [{low}, {high}]; "
-                    f"nearest {nearest}"
-                )
+    length: float = parameter(
+        0.40, "from the sensor to the tip", "m", least=0.2, most=0.45
+    )
+    diameter: float = parameter(0.005, "of the shaft", "m", least=0.003, most=0.01)
+    mount_length: float = parameter(
+        0.06, "of what the sensor carries the shaft with", "m", least=0.02, most=0.1
+    )
+    mount_mass: float = parameter(0.16, "of the mount", "kg", least=0.01, most=1)
+    shaft_mass: float = parameter(0.04, "of the shaft", "kg", least=0.005, most=0.5)
+    gauze_mass: float = parameter(
+        0.0, "of the gauze at the tip, wet about 0.02", "kg", least=0, most=0.1
+    )
 
     @property
     def mass(self) -> float:
@@ -122,7 +101,7 @@ def add_instrument(
         ValueError: If a parameter cannot be.
     """
     params = params or InstrumentParams()
-    params.check()
+    check(params)
     instance = plant.AddModelInstance("instrument")
     body = plant.AddRigidBody("instrument", instance, _inertia(params))
     sensor = plant.AddJoint(

@@ -1,11 +1,11 @@
-"""The surgeon's tools S and O and the endoscope C: bodies posed by blocks.
+"""The surgeon's tools and the endoscope: bodies posed by blocks.
 
 They are in the plant's SceneGraph, so that true clearances are Drake's signed
 distances, but they are not part of the plant: a person moves them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -24,106 +24,98 @@ from pydrake.geometry import (
     Sphere,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import BasicVector, LeafSystem
 
 from plants.common.lathe import lathe
 from plants.common.looks import DARK, GREEN, RED, STEEL, TROCAR, VIEW, illustration
+from systems.common.block import Block
+from systems.common.parameter import ParameterError, check, parameter
+from systems.common.signal import view
+from systems.common.signals import Shaft
 
-NAMES = ("S", "O", "C")
+TOOLS = (("target", "target"), ("obstacle", "obstacle"), ("camera", "camera"))
+"""Name and role of each tool."""
 
 
 @dataclass
 class PosedToolsParams:
-    """Shapes of the posed tools, and where their trocars are drawn.
+    """Shapes of the posed tools, and where their trocars are drawn."""
 
-    Attributes:
-        tool_diameter: Of S and O, in m.
-        tool_length: Of their shafts, from the tip to the hand, in m.
-        endoscope_diameter: In m.
-        endoscope_length: In m.
-        view_half_angle: Half the endoscope's field of view, in rad; drawn only.
-        view_length: Length of the drawn cone, in m.
-        fulcrums: Positions in W of the trocars of S, O and C, in m (3 x 3). A
-            trocar is drawn on the shaft's point nearest to it.
-    """
-
-    tool_diameter: float = 0.005
-    tool_length: float = 0.33
-    endoscope_diameter: float = 0.010
-    endoscope_length: float = 0.31
-    view_half_angle: float = 0.61
-    view_length: float = 0.11
-    fulcrums: list[list[float]] = field(
-        default_factory=lambda: [
-            [0.09, 0.05, 0.0],
-            [0.08, -0.06, 0.0],
-            [0.0, 0.09, 0.0],
-        ]
+    tool_diameter: float = parameter(
+        0.005, "of all but the camera", "m", least=0.002, most=0.015
+    )
+    tool_length: float = parameter(
+        0.33, "of a shaft from the tip to the hand", "m", least=0.1, most=0.6
+    )
+    endoscope_diameter: float = parameter(
+        0.010, "of the camera", "m", least=0.002, most=0.015
+    )
+    endoscope_length: float = parameter(
+        0.31, "of the camera's shaft", "m", least=0.1, most=0.6
+    )
+    view_half_angle: float = parameter(
+        0.61, "half the drawn field of view", "rad", least=0.1, most=1.5
+    )
+    view_length: float = parameter(0.11, "of the drawn cone", "m", least=0.02, most=0.3)
+    # A trocar is drawn on the shaft's point nearest to it.
+    fulcrums: list[list[float]] = parameter(
+        [[0.09, 0.05, 0.0], [0.08, -0.06, 0.0], [0.0, 0.09, 0.0]],
+        "of the tools in their order, in W",
+        "m",
+        least=-1,
+        most=1,
+        shape=(-1, 3),
     )
 
-    def check(self) -> None:
-        """Raises ValueError for a dimension that cannot be."""
-        bounds = {
-            "tool_diameter": (0.002, 0.015),
-            "tool_length": (0.1, 0.6),
-            "endoscope_diameter": (0.002, 0.015),
-            "endoscope_length": (0.1, 0.6),
-            "view_half_angle": (0.1, 1.2),
-            "view_length": (0.02, 0.3),
-        }
-        for name, (low, high) in bounds.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                nearest = low if not value > low else high
-                raise ValueError(
-                    f"posed_tools.{name}={value} must be in [{low}, {high}]; "
-                    f"nearest {nearest}"
-                )
-        if len(self.fulcrums) != 3 or any(
-            len(p) != 3 or not all(math.isfinite(x) for x in p) for p in self.fulcrums
-        ):
-            raise ValueError(
-                f"posed_tools.fulcrums={self.fulcrums} must be three points (x, y, z)"
-            )
 
-
-class PosedTools(LeafSystem):
-    """Poses the bodies of the tools S, O and C in a SceneGraph.
+class PosedTools(Block):
+    """Poses the bodies of the surgeon's tools and of the camera in a SceneGraph.
 
     Each tool's frame has its origin at the tip and its z axis along the shaft,
     towards the tip; the shaft is a capsule whose surface ends at the tip.
 
-    Ports ``S``, ``O`` and ``C`` accept a shaft each: tip p_WP in m and unit vector
-    u_W towards the tip, world frame (6).
+    Ports ``target``, ``obstacle`` and ``camera``, or of whatever names the tools have,
+    accept a `Shaft` each.
     Port ``poses`` emits the frames' poses for the SceneGraph (FramePoseVector).
 
     Attributes:
-        shafts: Proximity geometries of the shafts, by "S", "O", "C".
+        shafts: Proximity geometries of the shafts, by the tools' names.
     """
 
     def __init__(
-        self, scene_graph: Any, params: PosedToolsParams | None = None
+        self,
+        scene_graph: Any,
+        params: PosedToolsParams | None = None,
+        tools: Sequence[tuple[str, str]] = TOOLS,
     ) -> None:
         """Registers the bodies; the SceneGraph must not be built yet.
 
+        Args:
+            scene_graph: Owner of the bodies.
+            params: Shapes.
+            tools: Name and role of each: target, obstacle, or camera.
+
         Raises:
-            ValueError: If a parameter cannot be.
+            ParameterError: If a parameter cannot be.
         """
         super().__init__()
         self.params = params or PosedToolsParams()
-        self.params.check()
+        check(self.params)
+        if len(self.params.fulcrums) != len(tools):
+            raise ParameterError(
+                f"posed_tools.fulcrums={self.params.fulcrums} m: expected {len(tools)} "
+                f"x 3 numbers, one fulcrum for each of "
+                f"{', '.join(name for name, _ in tools)}"
+            )
         self.source_id = scene_graph.RegisterSource("posed_tools")
         self.shafts: dict[str, Any] = {}
         self._ports: list[Any] = []
         self._frames: list[Any] = []
         self._trocars: list[Any] = []
         self._fulcrums = np.array(self.params.fulcrums, float)
-        for name, fulcrum in zip(NAMES, self.params.fulcrums, strict=True):
-            self._frames.append(self._add_tool(scene_graph, name))
-            self._trocars.append(self._add_trocar(scene_graph, name))
-            # Hanging straight down, some 100 mm inside.
-            example = [fulcrum[0], fulcrum[1], fulcrum[2] - 0.1, 0.0, 0.0, -1.0]
-            self._ports.append(self.DeclareVectorInputPort(name, BasicVector(example)))
+        for name, role in tools:
+            self._frames.append(self._add_tool(scene_graph, name, role))
+            self._trocars.append(self._add_trocar(scene_graph, name, role))
+            self._ports.append(self.signal_in(name, Shaft))
         self.DeclareAbstractOutputPort(
             "poses",
             lambda: Value(FramePoseVector()),
@@ -137,18 +129,17 @@ class PosedTools(LeafSystem):
             self._ports, self._frames, self._trocars, self._fulcrums, strict=True
         ):
             # Arrays: Drake takes over a list several times slower.
-            shaft = port.Eval(context)
-            p, u = shaft[:3], shaft[3:]
+            p, u = view(Shaft, port.Eval(context))
             R = RotationMatrix.MakeFromOneVector(u, 2)
             poses.set_value(frame, RigidTransform(R, p))
             nearest = p + u.dot(fulcrum - p) * u
             poses.set_value(trocar, RigidTransform(R, nearest))
         output.set_value(poses)
 
-    def _add_tool(self, scene_graph: Any, name: str) -> Any:
+    def _add_tool(self, scene_graph: Any, name: str, role: str) -> Any:
         """Registers a tool's frame, its shaft and its looks."""
         p = self.params
-        scope = name == "C"
+        scope = role == "camera"
         radius = 0.5 * (p.endoscope_diameter if scope else p.tool_diameter)
         length = p.endoscope_length if scope else p.tool_length
         frame = scene_graph.RegisterFrame(self.source_id, GeometryFrame(f"tool_{name}"))
@@ -170,7 +161,7 @@ class PosedTools(LeafSystem):
                 ("view", lathe(cone, "view"), 0.0, VIEW),
             )
         else:
-            rgba = GREEN if name == "S" else RED
+            rgba = GREEN if role == "target" else RED
             tube = length - 0.012
             looks = (
                 ("tube", Cylinder(radius, tube), -0.012 - 0.5 * tube, rgba),
@@ -182,9 +173,10 @@ class PosedTools(LeafSystem):
         self._draw(scene_graph, frame, looks)
         return frame
 
-    def _add_trocar(self, scene_graph: Any, name: str) -> Any:
+    def _add_trocar(self, scene_graph: Any, name: str, role: str) -> Any:
         """Registers the trocar that a tool goes through."""
-        wide = 0.5 * self.params.endoscope_diameter if name == "C" else 0.0025
+        scope = role == "camera"
+        wide = 0.5 * self.params.endoscope_diameter if scope else 0.0025
         frame = scene_graph.RegisterFrame(
             self.source_id, GeometryFrame(f"trocar_{name}")
         )
@@ -212,7 +204,11 @@ def _along(z: float) -> RigidTransform:
 
 
 def add_posed_tools(
-    builder: Any, scene_graph: Any, plant: Any, params: PosedToolsParams | None = None
+    builder: Any,
+    scene_graph: Any,
+    plant: Any,
+    params: PosedToolsParams | None = None,
+    tools: Sequence[tuple[str, str]] = TOOLS,
 ) -> PosedTools:
     """Adds the tools as `posed_tools`, wired to the SceneGraph, out of contact.
 
@@ -221,14 +217,17 @@ def add_posed_tools(
         scene_graph: The plant's SceneGraph, owned by the builder.
         plant: The finalized plant.
         params: Shapes.
+        tools: Name and role of each.
     """
-    tools = builder.AddNamedSystem("posed_tools", PosedTools(scene_graph, params))
-    builder.Connect(
-        tools.GetOutputPort("poses"),
-        scene_graph.get_source_pose_port(tools.source_id),
+    posed = builder.AddNamedSystem(
+        "posed_tools", PosedTools(scene_graph, params, tools)
     )
-    exclude_from_plant(scene_graph, plant, tools)
-    return tools
+    builder.Connect(
+        posed.GetOutputPort("poses"),
+        scene_graph.get_source_pose_port(posed.source_id),
+    )
+    exclude_from_plant(scene_graph, plant, posed)
+    return posed
 
 
 def exclude_from_plant(scene_graph: Any, plant: Any, tools: PosedTools) -> None:

@@ -2,55 +2,59 @@
 
 from dataclasses import dataclass
 
+from systems.common.parameter import Rules, parameter
+
+LAG = 0.1
+"""Of a servo behind its set-point at most, in s."""
+
 
 @dataclass
 class SnakeDriveParams:
-    """Masses and stiffness of the snake. SI units.
+    """Masses and stiffness of the snake.
 
     With drums the wires are as stiff as their drums hold them: a spring on each
     of a module's two angles, implicit in the integrator. The default equals
     steel wires of 2e4 N/m (0.3 mm, some 350 mm long) seen from a module,
     `wire_stiffness` times 3/2 (2 R)^2.
-
-    Attributes:
-        kp: Stiffness of a and b of each module in Nm/rad.
-        kd: Their damping in Nm s/rad.
-        travel_kp: Stiffness of the translation in N/m.
-        travel_kd: Its damping in N s/m.
-        friction: Viscous friction of each ball, about either axis, in Nm s/rad.
-        ball_mass: Of one drilled titanium ball in kg.
-        plate_mass: Of one plate in kg.
-        tool_mass: Of the wire ring and its shank in kg.
-        carriage_mass: Of what the translation moves besides, in kg.
-        wire_stiffness: Of one wire in N/m, for elastic wires.
-        wire_damping: Of one wire in N s/m, for elastic wires.
     """
 
-    kp: float = 1.0
-    kd: float = 4.0e-3
-    travel_kp: float = 4.0e4
-    travel_kd: float = 80.0
-    friction: float = 1.0e-5
-    ball_mass: float = 4.0e-4
-    plate_mass: float = 3.0e-4
-    tool_mass: float = 5.0e-4
-    carriage_mass: float = 0.05
-    wire_stiffness: float = 2.0e4
-    wire_damping: float = 2.0
+    kp: float = parameter(
+        1.0, "stiffness of a and b of each module", "N m/rad", least=0.01, most=100.0
+    )
+    kd: float = parameter(4.0e-3, "their damping", "N m s/rad", above=0.0, most=1.0)
+    travel_kp: float = parameter(
+        4.0e4, "stiffness of the translation", "N/m", least=1e3, most=1e7
+    )
+    travel_kd: float = parameter(80.0, "its damping", "N s/m", above=0.0, most=1e5)
+    friction: float = parameter(
+        1.0e-5,
+        "viscous, of each ball about either axis",
+        "N m s/rad",
+        above=0.0,
+        most=0.01,
+    )
+    ball_mass: float = parameter(
+        4.0e-4, "of one drilled titanium ball", "kg", least=1e-6, most=0.1
+    )
+    plate_mass: float = parameter(3.0e-4, "of one plate", "kg", least=1e-6, most=0.1)
+    tool_mass: float = parameter(
+        5.0e-4, "of the wire ring and its shank", "kg", least=1e-6, most=0.1
+    )
+    carriage_mass: float = parameter(
+        0.05, "of what the translation moves besides", "kg", least=1e-3, most=10.0
+    )
+    wire_stiffness: float = parameter(
+        2.0e4, "of one elastic wire", "N/m", least=1e3, most=1e6
+    )
+    wire_damping: float = parameter(
+        2.0, "of one elastic wire", "N s/m", above=0.0, most=1e3
+    )
 
-    def check(self) -> "SnakeDriveParams":
-        """Returns itself if all values are positive.
-
-        Raises:
-            ValueError: Naming the value that is not, and the default.
-        """
-        for name, value in vars(self).items():
-            if not value > 0.0:
-                default = getattr(SnakeDriveParams(), name)
-                raise ValueError(
-                    f"{name}={value} must be > 0; the default is {default}"
-                )
-        return self
+    def rules(self) -> Rules:
+        """Servos must not lag by more than a motion's own time."""
+        slow = f"at most {LAG:g} s times its stiffness, or the servo lags by more"
+        yield self.lead <= LAG, "kd", slow
+        yield self.travel_lead <= LAG, "travel_kd", slow
 
     @property
     def lead(self) -> float:

@@ -1,7 +1,9 @@
 """Geometry, limits and wires of the snake, with their sources."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
+
+from systems.common.parameter import Rules, parameter
 
 MODULES = 3
 """Bending modules in series (paper, III.A)."""
@@ -13,37 +15,81 @@ DRUMS = WIRES * MODULES + 1
 """Motors: one a wire, and the one that slides the robot."""
 
 
+LEAST_GAP = math.radians(10.0)
+"""Between two wires' holes in a plate."""
+
+
 @dataclass
 class SnakeParams:
     """The snake of Martin et al., III.A and Figures 3 to 6. Lengths in m.
 
     The paper gives the width (8 mm), the bend (90 deg a module) and the names of
     the lengths, but no lengths; the defaults are the middle of what these leave
-    open (see `check`).
-
-    Attributes:
-        ball_radius: R, of the balls and of the circle the wires lie on.
-        plate_thickness: e.
-        half_pitch: h, half the distance between two ball centres.
-        max_bend: Largest beta in rad, at *each* of a module's two balls.
-        travel: Least and largest translation s, [s_min, s_max].
-        tool_offset: l, from O3 (2 h past the last ball centre) to the tool.
-        tool_radius: Radius of the ball that the rotating wire ring sweeps.
-        body_radius: Outer radius of plates and sheath (the paper's 8 mm wide).
-        first_azimuths: Azimuth of the first wire of each module, in rad; the
-            other two follow at 120 and 240 deg. Nine different holes are needed.
+    open (see `rules`).
     """
 
-    ball_radius: float = 3.0e-3
-    plate_thickness: float = 1.0e-3
-    half_pitch: float = 3.2e-3
-    max_bend: float = math.pi / 4
-    travel: list[float] = field(default_factory=lambda: [-0.050, 0.110])
-    tool_offset: float = 3.0e-3
-    tool_radius: float = 4.0e-3
-    body_radius: float = 4.0e-3
-    first_azimuths: list[float] = field(
-        default_factory=lambda: [0.0, math.radians(40.0), math.radians(80.0)]
+    ball_radius: float = parameter(
+        3.0e-3,
+        "R, of the balls and of the circle the wires lie on",
+        "m",
+        least=5e-4,
+        most=0.02,
+    )
+    plate_thickness: float = parameter(
+        1.0e-3, "e, of a plate", "m", least=1e-4, most=0.01
+    )
+    half_pitch: float = parameter(
+        3.2e-3,
+        "h, half the distance between two ball centres",
+        "m",
+        least=5e-4,
+        most=0.02,
+    )
+    # A module bends twice that, 90 deg at most (paper, III.A).
+    max_bend: float = parameter(
+        math.pi / 4,
+        "largest beta at each of a module's two balls",
+        "rad",
+        least=0.01,
+        most=math.pi / 4,
+    )
+    travel: list[float] = parameter(
+        [-0.050, 0.110],
+        "least and largest translation s",
+        "m",
+        least=-0.5,
+        most=0.5,
+        shape=(2,),
+    )
+    tool_offset: float = parameter(
+        3.0e-3,
+        "l, from O3 (2 h past the last ball centre) to the tool",
+        "m",
+        least=0.0,
+        most=0.05,
+    )
+    tool_radius: float = parameter(
+        4.0e-3,
+        "of the ball that the rotating wire ring sweeps",
+        "m",
+        least=0.0,
+        most=0.02,
+    )
+    body_radius: float = parameter(
+        4.0e-3,
+        "of plates and sheath; the paper's are 8 mm wide",
+        "m",
+        least=5e-4,
+        most=0.02,
+    )
+    # Nine different holes are needed.
+    first_azimuths: list[float] = parameter(
+        [0.0, math.radians(40.0), math.radians(80.0)],
+        "of the first wire of each module; the others follow at 120 and 240 deg",
+        "rad",
+        least=-2 * math.pi,
+        most=2 * math.pi,
+        shape=(MODULES,),
     )
 
     @property
@@ -61,73 +107,49 @@ class SnakeParams:
         turn = 2 * math.pi / WIRES
         return [[f + j * turn for j in range(WIRES)] for f in self.first_azimuths]
 
-    def check(self) -> "SnakeParams":
-        """Returns itself if a robot can be built and driven so.
+    def rules(self) -> Rules:
+        """What a robot that can be built and driven keeps to.
 
-        Raises:
-            ValueError: Naming the parameter, the inequality it breaks and the
-                nearest valid choice.
+        Wires and rims must not be pinched, lengths must mean one posture, and nine
+        wires need nine holes.
         """
-        for name in ("ball_radius", "plate_thickness", "half_pitch", "body_radius"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name}={getattr(self, name)} m must be > 0")
-        for name in ("tool_offset", "tool_radius"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name}={getattr(self, name)} m must be >= 0")
-        if not 0.0 < self.max_bend <= math.pi / 4 + 1e-12:
-            raise ValueError(
-                f"max_bend={self.max_bend:.4f} rad must lie in (0, pi/4]: a module "
-                "bends 2 beta, 90 deg at most (paper, III.A); nearest: "
-                f"{min(max(self.max_bend, 0.01), math.pi / 4):.4f}"
-            )
-        if len(self.travel) != 2 or not self.travel[0] < self.travel[1]:
-            raise ValueError(f"travel={self.travel} m must be [s_min, s_max], rising")
-        if self.half_pitch < self.ball_radius:
-            raise ValueError(
-                f"half_pitch h={self.half_pitch:g} m < ball_radius R="
-                f"{self.ball_radius:g} m: the balls of a module overlap; "
-                f"nearest: h={self.ball_radius:g}"
-            )
-        self._check_bend()
-        self._check_wires()
-        return self
-
-    def _check_bend(self) -> None:
-        """Wires and rims must not be pinched, and lengths must mean one posture."""
         t = math.tan(self.max_bend / 2)
-        d, R = self.face, self.ball_radius
+        h, d, R = self.half_pitch, self.face, self.ball_radius
+        low, high = self.travel
+        yield low < high, "travel", "[s_min, s_max], rising"
+        yield (
+            h >= R,
+            "half_pitch",
+            f">= ball_radius R={R:g} m, or the balls of a module overlap",
+        )
+        yield (
+            d > 0.0,
+            "plate_thickness",
+            f"< 2 half_pitch={2 * h:g} m, or there is no room between plates",
+        )
         outer = max(R, self.body_radius)
-        if not t < d / outer:
-            raise ValueError(
-                f"tan(max_bend/2)={t:.4f} >= d/r={d / outer:.4f} with d=h-e/2="
-                f"{d:g} m and r={outer:g} m: neighbouring plates touch at the rim "
-                f"before max_bend; nearest: max_bend={2 * math.atan(d / outer):.4f}"
-            )
-        if not t < R / (2 * d):
-            raise ValueError(
-                f"tan(max_bend/2)={t:.4f} >= R/(2d)={R / (2 * d):.4f} with d=h-e/2="
-                f"{d:g} m: two postures share the same wire lengths and the wires "
-                "cannot all be taut; nearest: max_bend="
-                f"{2 * math.atan(R / (2 * d)):.4f} or half_pitch="
-                f"{R / (2 * t) + self.plate_thickness / 2:g}"
-            )
-
-    def _check_wires(self) -> None:
-        """Nine wires need nine holes."""
-        if len(self.first_azimuths) != MODULES:
-            raise ValueError(
-                f"first_azimuths={self.first_azimuths} must have {MODULES} entries, "
-                "one a module"
-            )
+        yield (
+            t < d / outer,
+            "max_bend",
+            f"tan(max_bend/2)={t:.4f} < d/r={d / outer:.4f} with d=h-e/2={d:g} m and "
+            f"r={outer:g} m, or neighbouring plates touch at the rim; nearest: "
+            f"max_bend={2 * math.atan(d / outer):.4f}",
+        )
+        yield (
+            t < R / (2 * d),
+            "max_bend",
+            f"tan(max_bend/2)={t:.4f} < R/(2d)={R / (2 * d):.4f} with d=h-e/2={d:g} m, "
+            "or two postures share the same wire lengths and the wires cannot all be "
+            f"taut; nearest: max_bend={2 * math.atan(R / (2 * d)):.4f} or "
+            f"half_pitch={R / (2 * t) + self.plate_thickness / 2:g}",
+        )
         turn = 2 * math.pi
         holes = sorted(phi % turn for row in self.azimuths() for phi in row)
-        gap = min(
-            (b - a) % turn
-            for a, b in zip(holes, [*holes[1:], holes[0] + turn], strict=True)
+        after = [*holes[1:], holes[0] + turn]
+        gap = min(b - a for a, b in zip(holes, after, strict=True))
+        yield (
+            gap >= LEAST_GAP,
+            "first_azimuths",
+            f"wires at least {math.degrees(LEAST_GAP):.0f} deg apart, two are "
+            f"{math.degrees(gap):.1f}; nearest: 0, 40 and 80 deg",
         )
-        if gap < math.radians(10.0):
-            raise ValueError(
-                f"first_azimuths={self.first_azimuths} rad put two wires "
-                f"{math.degrees(gap):.1f} deg apart, at least 10 deg are needed; "
-                "nearest: 0, 40 and 80 deg"
-            )

@@ -32,6 +32,7 @@ from pydrake.multibody.tree import (
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.looks import draw_ball, draw_carriage, draw_plate, draw_tool
 from plants.snake.parameters import MODULES, SnakeParams
+from systems.common.parameter import check
 
 POSITIONS = 1 + 4 * MODULES
 """Generalised positions, and velocities: s, then a, b, b_far, a_far a module."""
@@ -91,8 +92,8 @@ def add_snake(
     Raises:
         ValueError: If a parameter makes no sense.
     """
-    params = (params or SnakeParams()).check()
-    drive = (drive or SnakeDriveParams()).check()
+    params = check(params or SnakeParams())
+    drive = check(drive or SnakeDriveParams())
     instance = plant.AddModelInstance("snake")
     chain = _Chain(plant, instance, params, drive, elastic)
     chain.add_carriage(frame)

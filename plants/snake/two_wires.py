@@ -3,7 +3,7 @@
 Two norms p_i leave a line in the half turn u of `actuation`, and |u| = 1 cuts it
 twice: two solutions, where the dialytic elimination of the paper [18] has an octic
 with spurious roots. Of the two, at most one is within the bend's limit as long as
-tan(max_bend/2) < R/(2d), which `SnakeParams.check` demands.
+tan(max_bend/2) < R/(2d), which `SnakeParams.rules` demand.
 """
 
 import math

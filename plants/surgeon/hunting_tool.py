@@ -5,152 +5,129 @@ of a tool that always comes for it, as long as the robot can evade faster than i
 """
 
 from dataclasses import dataclass
-from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from plants.surgeon.surgeon_tool import SurgeonToolParams
-from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
-    Vector,
-    all_finite,
     along,
     closest_on_segment,
     closest_points,
+    scaled,
     sub,
     unit,
     xyz,
 )
-from systems.common.signals import ROBOT_TOOL_EXAMPLE
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Vector, vector
+from systems.common.signals import RobotTool, Shaft, Velocity, finite_tool
+from systems.common.step_block import StepBlock, wired
 
 _DEEP = 0.02
 """Least depth of the chasing tip below its fulcrum, m."""
+_STILL = (0.0, 0.0, 0.0)
 
 
 @dataclass
 class Hunt:
-    """A chase of the robot's shaft.
+    """A chase of the robot's shaft."""
 
-    Attributes:
-        speed: Of the tip, m/s; 0 for none: the tool then moves as usual.
-        start: When it begins, s.
-        end: When it ends, s.
-        from_fulcrum: The shaft stays this far from the robot's fulcrum, m.
-        period: Of the pursuer's reaction, s.
-    """
+    # 0 for none: the tool then moves as usual.
+    speed: float = parameter(0.0, "of the tip", "m/s", least=0, most=0.3)
+    start: float = parameter(0.5, "when it begins", "s", least=0, most=1e4)
+    end: float = parameter(1e3, "when it ends", "s", least=0, most=1e4)
+    from_fulcrum: float = parameter(
+        0.03, "that the shaft stays off the robot's", "m", least=0, most=0.2
+    )
+    period: float = parameter(1 / 60, "of the pursuer's reaction", "s", above=0, most=1)
 
-    speed: float = 0.0
-    start: float = 0.5
-    end: float = 1e3
-    from_fulcrum: float = 0.03
-    period: float = 1.0 / 60.0
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        yield self.start <= self.end, "end", f">= start, {self.start} s"
 
-    def check(self) -> None:
-        """Checks the values.
 
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        for name in ("speed", "start", "from_fulcrum"):
-            value = getattr(self, name)
-            if not (isfinite(value) and value >= 0.0):
-                raise ValueError(f"hunt: {name}={value} must be finite and >= 0")
-        if not self.period > 0.0:
-            raise ValueError(f"hunt: period={self.period} s must be > 0")
-        if not self.start <= self.end:
-            raise ValueError(
-                f"hunt: end={self.end} s must not come before start={self.start} s"
-            )
+class Tip(NamedTuple):
+    """Place of the tip at the last reaction, in m, and the time of it in s."""
+
+    p: Vector
+    time: float
 
 
 @compiled
-def pursue(params: Any, g_o: Vector, tip: Vector, g: Vector, p: Vector) -> Vector:
+def pursue(params: Any, g_o: Vector, tip: Vector, robot: RobotTool) -> Vector:
     """Velocity of the chasing tip, m/s: M_O goes for M_R.
 
     Args:
         params: A record of a `Hunt`.
         g_o: Fulcrum G_O, m.
         tip: Tip of O, m.
-        g: Fulcrum G_R, m.
-        p: Tip of R, m.
+        robot: The robot's tool.
     """
-    _, _, _, m_r, m_o = closest_points(g, p, g_o, tip)
-    v = along((0.0, 0.0, 0.0), params.speed, unit(sub(m_r, m_o)))
+    g = robot.fulcrum
+    _, _, _, m_r, m_o = closest_points(g, robot.tip, g_o, tip)
+    v = scaled(params.speed, unit(sub(m_r, m_o)))
     ahead = along(tip, params.period, v)
     now, then = closest_on_segment(g, g_o, tip)[1], closest_on_segment(g, g_o, ahead)[1]
     too_near = then < params.from_fulcrum and then < now
     if too_near or ahead[2] > g_o[2] - _DEEP:
-        return 0.0, 0.0, 0.0
+        return _STILL
     return v
 
 
 @compiled
-def _next(
-    record: np.ndarray, state: np.ndarray, time: float, g_o: Vector, tool: np.ndarray
-) -> np.ndarray:
-    params = record[0]
-    tip = along(xyz(state, 0), time - state[6], xyz(state, 3))
-    v = (0.0, 0.0, 0.0)
-    if params.start <= time < params.end and all_finite(tool):
-        v = pursue(params, g_o, tip, xyz(tool, 0), xyz(tool, 3))
-    return np.array(tip + v + (time,))
+def _react(
+    params: Any, last: Tip, going: Velocity, time: float, robot: RobotTool
+) -> tuple[Tip, Velocity]:
+    tip, v = along(last.p, time - last.time, going.v), _STILL
+    if params.start <= time < params.end and finite_tool(robot):
+        v = pursue(params, xyz(params.p_WG, 0), tip, robot)
+    return Tip(tip, time), Velocity(v)
 
 
 @compiled
-def _shaft(state: np.ndarray, time: float, g_o: Vector) -> np.ndarray:
-    tip = along(xyz(state, 0), time - state[6], xyz(state, 3))
-    return np.array(tip + unit(sub(tip, g_o)))
+def _shaft(params: Any, last: Tip, going: Velocity, time: float) -> tuple[Shaft]:
+    tip = along(last.p, time - last.time, going.v)
+    return (Shaft(tip, unit(sub(tip, params.p_WG))),)
 
 
-class HuntingTool(Block):
+class HuntingTool(StepBlock):
     """A tool in the surgeon's hand that chases the robot's shaft, through its fulcrum.
 
-    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
-    (6), m, in W. Port ``shaft`` emits the tool's true shaft (6): tip p_WP in m and unit
-    vector u_W, in W. Port ``tip_velocity`` emits the tip's true velocity v_WP (3), m/s,
-    in W, for the log.
-
-    The discrete state is tip (3), its velocity (3) and the time they hold at.
-
-    Args:
-        tool: Fulcrum and first waypoint, where the tip starts.
-        hunt: The chase.
-
-    Raises:
-        ValueError: If a parameter is out of range.
+    Port ``robot_tool`` accepts the `RobotTool`.
+    Port ``shaft`` emits the tool's true `Shaft`.
+    Port ``tip_velocity`` emits the tip's true `Velocity`, for the log.
     """
 
     def __init__(
         self, tool: SurgeonToolParams | None = None, hunt: Hunt | None = None
     ) -> None:
+        """Makes the block.
+
+        Args:
+            tool: Fulcrum and first waypoint, where the tip starts.
+            hunt: The chase.
+
+        Raises:
+            ParameterError: If a parameter is out of range.
+        """
         super().__init__()
         tool, hunt = tool or SurgeonToolParams(), hunt or Hunt(speed=0.02)
-        tool.check()
-        hunt.check()
-        self._constants = packed(hunt)
-        x, y, z = tool.p_WG
-        self._p_WG = (float(x), float(y), float(z))
-        self._robot_tool = self.vector_in("robot_tool", ROBOT_TOOL_EXAMPLE)
-        self.DeclareDiscreteState(np.array([*tool.points[0], 0.0, 0.0, 0.0, 0.0]))
+        check(tool)
+        check(hunt)
+        self._constants = packed(hunt, p_WG=vector(tool.p_WG))
+        start = {
+            "_tip": Tip(vector(tool.points[0]), 0.0),
+            "tip_velocity": Velocity(_STILL),
+        }
+        self.declare_update(
+            _react, [self._constants], {"robot_tool": RobotTool}, start, hunt.period
+        )
+        self._place = wired(_shaft, 1, [Tip, Velocity], [], [Shaft], True)
         moving = {self.xd_ticket(), self.time_ticket()}
-        self.vector_out("shaft", 6, self._calc_shaft, moving)
-        self.vector_out("tip_velocity", 3, self._calc_velocity, {self.xd_ticket()})
-        self.update_every(hunt.period, self._update)
+        self.signal_out("shaft", Shaft, self._calc_shaft, moving)
 
     def _calc_shaft(self, context: Any) -> np.ndarray:
-        state = context.get_discrete_state_vector().value()
-        return _shaft(state, context.get_time(), self._p_WG)
-
-    def _calc_velocity(self, context: Any) -> np.ndarray:
-        return context.get_discrete_state_vector().value()[3:6]
-
-    def _update(self, context: Any) -> np.ndarray:
-        return _next(
-            self._constants,
-            context.get_discrete_state_vector().value(),
-            context.get_time(),
-            self._p_WG,
-            self._robot_tool.Eval(context),
-        )
+        groups = [context.get_discrete_state(group).value() for group in range(2)]
+        return self._place(self._constants, *groups, context.get_time())

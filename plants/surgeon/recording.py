@@ -4,8 +4,10 @@ A recording is a CSV file with the header `t,x,y,z`: time in s and the tool's ti
 the world frame W (z up) in m. Other columns are ignored.
 """
 
+import codecs
 from collections.abc import Sequence
 import csv
+import io
 import math
 from pathlib import Path
 
@@ -42,8 +44,10 @@ def load_recording(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
             or is in another unit than metres. The message names file and line.
     """
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
+        data = Path(path).read_bytes()
+        marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = data.decode("utf-16" if marked else "utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text, newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ValueError(f"recording {path}: cannot be read: {error}") from error
     header = [name.strip() for name in rows[0]] if rows else []

@@ -4,9 +4,7 @@ Section 2.1 of the paper (Figure 1): the target tool S and the obstacle tool O e
 through their fulcrums G_S and G_O, and the surgeon moves them as he or she likes.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,8 +22,12 @@ from plants.surgeon.tool_motion import (
 )
 from systems.common.block import Block
 from systems.common.compiled import compiled
-from systems.common.geometry import Vector, sub, unit
+from systems.common.geometry import sub, unit
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Vector, vector, writer
+from systems.common.signals import Shaft, Velocity
 
+write_shaft = writer(Shaft)
 _LEAST_DEPTH = 0.005  # m, of a tip below its fulcrum
 
 
@@ -33,58 +35,34 @@ _LEAST_DEPTH = 0.005  # m, of a tip below its fulcrum
 class SurgeonToolParams:
     """How one of the surgeon's tools moves. Frame W, z up, SI units."""
 
-    # The fulcrum G, in m.
-    p_WG: list[float] = field(default_factory=lambda: [0.08, 0.0, 0.0])
-    # Waypoints of the tip: times in s, and points in m. Minimum jerk from each to
-    # the next, at rest at each of them, held before the first and after the last.
-    times: list[float] = field(default_factory=lambda: [0.0])
-    points: list[list[float]] = field(default_factory=lambda: [[0.05, 0.0, -0.12]])
-    # A recording (CSV `t,x,y,z`) takes the waypoints' place if its path is given.
-    recording: str | None = None
-    # Tremor, 8 to 12 Hz: root mean square in three dimensions, in m. A surgeon's
-    # is 50e-6 to 200e-6.
-    tremor_rms: float = 0.0
-    # Chooses the phases and frequencies of the tremor.
-    tremor_seed: int = 0
-    # Pushes on top of the motion.
-    pushes: list[Push] = field(default_factory=list)
+    p_WG: list[float] = parameter(
+        [0.08, 0.0, 0.0], "its fulcrum in W", "m", least=-1, most=1, shape=(3,)
+    )
+    # Waypoints of the tip. Minimum jerk from each to the next, at rest at each of
+    # them, held before the first and after the last.
+    times: list[float] = parameter(
+        [0.0], "of the waypoints", "s", least=0, most=1e4, shape=(-1,)
+    )
+    points: list[list[float]] = parameter(
+        [[0.05, 0.0, -0.12]], "of the tip in W", "m", least=-1, most=1, shape=(-1, 3)
+    )
+    recording: str | None = parameter(
+        None, "CSV `t,x,y,z` that takes the waypoints' place", file=True
+    )
+    # 8 to 12 Hz; a surgeon's is 50e-6 to 200e-6.
+    tremor_rms: float = parameter(
+        0.0, "tremor, rms in three dimensions", "m", least=0, most=0.002
+    )
+    tremor_seed: int = parameter(0, "of the tremor", least=0, most=2**63)
+    pushes: list[Push] = parameter([], "on top of the motion", shape=(-1,))
 
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        _check_vector("p_WG", self.p_WG)
-        if len(self.times) != len(self.points) or not self.times:
-            raise ValueError(
-                f"surgeon's tool: {len(self.times)} times for {len(self.points)} "
-                f"points; expected one time for every point, and at least one"
-            )
-        for time, after in zip(self.times, self.times[1:], strict=False):
-            if not time < after:
-                raise ValueError(
-                    f"surgeon's tool: times={self.times} must increase, "
-                    f"{after} s follows {time} s"
-                )
-        if not all(map(math.isfinite, self.times)):
-            raise ValueError(f"surgeon's tool: times={self.times} must be finite")
-        for point in self.points:
-            _check_vector("points", point)
-        if not 0.0 <= self.tremor_rms <= 0.002:
-            raise ValueError(
-                f"surgeon's tool: tremor_rms={self.tremor_rms} m must lie in "
-                f"[0, 0.002]; a surgeon's is 50e-6 to 200e-6"
-            )
-        if self.tremor_seed < 0:
-            raise ValueError(
-                f"surgeon's tool: tremor_seed={self.tremor_seed} must be >= 0"
-            )
-        for push in self.pushes:
-            push.check()
-
-
-def _check_vector(name: str, value: Sequence[float]) -> None:
-    if len(value) != 3 or not all(map(math.isfinite, value)):
-        raise ValueError(
-            f"surgeon's tool: {name}={list(value)} must be 3 finite numbers"
-        )
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        paired = len(self.times) == len(self.points) > 0
+        one_each = f"one for each of the {len(self.points)} points, and at least one"
+        yield paired, "times", one_each
+        pairs = zip(self.times, self.times[1:], strict=False)
+        yield all(a < b for a, b in pairs), "times", "increasing numbers"
 
 
 def tip_motion(params: SurgeonToolParams) -> Motion:
@@ -94,7 +72,7 @@ def tip_motion(params: SurgeonToolParams) -> Motion:
         ValueError: If a parameter makes no sense, the recording cannot be used, or
             the tip would come to its fulcrum or above it.
     """
-    params.check()
+    check(params)
     times, points = params.times, params.points
     if not params.recording:
         base = waypoint_motion(times, points)
@@ -130,34 +108,35 @@ def _shaft(
 ) -> np.ndarray:
     x, y, z, _, _, _ = evaluate(knots, pieces, waves, t)
     p = (x, y, z)
-    return np.array(p + unit(sub(p, p_WG)))
+    return write_shaft(Shaft(p, unit(sub(p, p_WG))))
 
 
 class SurgeonTool(Block):
     """A tool in the surgeon's hand, always through its fulcrum (section 2.1).
 
     A pure function of time: it has no state, and the same parameters give the same
-    motion. Port ``shaft`` emits the tool's true shaft (6): tip p_WP in m and unit
-    vector u_W along the shaft, from outside towards the tip, both in the world frame
-    W. Port ``tip_velocity`` emits the tip's true velocity v_WP (3) in m/s in W, for
-    the log.
+    motion.
 
-    Args:
-        params: How the tool moves; waypoints, or a recording, tremor, pushes.
-
-    Raises:
-        ValueError: If `params` make no sense, see `tip_motion`.
+    Port ``shaft`` emits the tool's true `Shaft`.
+    Port ``tip_velocity`` emits the tip's true `Velocity`, for the log.
     """
 
     def __init__(self, params: SurgeonToolParams | None = None) -> None:
+        """Makes the block.
+
+        Args:
+            params: How the tool moves; waypoints, or a recording, tremor, pushes.
+
+        Raises:
+            ValueError: If `params` make no sense, see `tip_motion`.
+        """
         super().__init__()
         params = params or SurgeonToolParams()
         self._motion = tip_motion(params)
-        x, y, z = params.p_WG
-        self._p_WG = (float(x), float(y), float(z))
+        self._p_WG = vector(params.p_WG)
         time = {self.time_ticket()}
-        self.vector_out("shaft", 6, self._calc_shaft, time)
-        self.vector_out("tip_velocity", 3, self._calc_velocity, time)
+        self.signal_out("shaft", Shaft, self._calc_shaft, time)
+        self.signal_out("tip_velocity", Velocity, self._calc_velocity, time)
 
     def _calc_shaft(self, context: Any) -> np.ndarray:
         motion = self._motion

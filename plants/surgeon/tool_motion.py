@@ -5,7 +5,7 @@ is a sum of piecewise polynomials and sinusoids, and all of it is in arrays.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from systems.common.compiled import compiled
+from systems.common.parameter import Rules, parameter
 
 _DEGREE = 5
 _TREMOR_WAVES = 3  # sinusoids; each axis has its own phases
@@ -22,34 +23,22 @@ _TREMOR_WAVES = 3  # sinusoids; each axis has its own phases
 class Push:
     """The surgeon pushes something aside, waits, and withdraws."""
 
-    # When the push begins, in s.
-    start: float = 0.0
-    # Its direction in W; any length but zero.
-    direction: list[float] = field(default_factory=lambda: [1.0, 0.0, 0.0])
-    # How far the tip goes, in m.
-    distance: float = 0.02
-    # Peak speed of the tip, in m/s, out and back (minimum jerk).
-    speed: float = 0.04
-    # How long it stays out, in s.
-    hold: float = 1.0
+    start: float = parameter(0.0, "when it begins", "s", least=0, most=1e4)
+    direction: list[float] = parameter(
+        [1.0, 0.0, 0.0], "in W, of any length", least=-1e3, most=1e3, shape=(3,)
+    )
+    distance: float = parameter(0.02, "how far the tip goes", "m", least=0, most=0.3)
+    # Minimum jerk, out and back.
+    speed: float = parameter(0.04, "peak of the tip's", "m/s", above=0, most=1)
+    hold: float = parameter(1.0, "how long it stays out", "s", least=0, most=1e4)
+
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        yield any(self.direction), "direction", "3 numbers, not all 0"
 
     def span(self) -> float:
         """Time it takes the tip to go out, or back, in s."""
         return 1.875 * self.distance / self.speed  # 1.875: peak over mean speed
-
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        length = math.hypot(*self.direction)
-        if len(self.direction) != 3 or not 0.0 < length < math.inf:
-            raise ValueError(
-                f"push: direction={self.direction} must be 3 finite numbers, not all 0"
-            )
-        for name in ("start", "distance", "hold"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"push: {name}={value} must be finite and >= 0")
-        if not 0.0 < self.speed < math.inf:
-            raise ValueError(f"push: speed={self.speed} m/s must be finite and > 0")
 
 
 @compiled

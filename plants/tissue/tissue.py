@@ -1,19 +1,19 @@
 """Labelled tissue as an image has it: a patient's mask, or a synthetic tumour.
 
-Frame P is the patient's (the file's world). Voxels may be longer along one axis
-than along another and lie at any angle.
+Frame P is the patient's, LPS (x to the left, y to the back, z to the head). Voxels may
+be longer along one axis than along another and lie at any angle.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import math
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.tissue.labels import BRAIN, CRITICAL, TUMOUR
+from plants.tissue.labels import CRITICAL, TUMOUR
+from systems.common.parameter import check, parameter
 
 
 @dataclass
@@ -24,11 +24,16 @@ class Tissue:
         labels: BRAIN, TUMOUR or CRITICAL of each voxel, uint8 (nx, ny, nz).
         X_PV: From voxel indices (i, j, k, 1) to positions in P in m, (4, 4).
         name: Where it comes from.
+        is_mask: Whether its voxels are what a mask has, and not only samples of a
+            shape.
+        notes: What had to be assumed, or was left out.
     """
 
     labels: NDArray[np.uint8]
     X_PV: NDArray[np.float64]
     name: str = ""
+    is_mask: bool = False
+    notes: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         spacing = self.spacing
@@ -72,120 +77,53 @@ def signed_distance(mask: NDArray[np.bool_], spacing: Sequence[float]) -> NDArra
     return (inside - outside).astype(np.float32)
 
 
-def one_tumour(mask: NDArray[np.bool_], component: int, name: str) -> NDArray[np.bool_]:
-    """One connected component of a mask.
+def parts_by_size(
+    mask: NDArray[np.bool_],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Parts of a mask that are connected by faces.
 
-    Args:
-        mask: Tumour voxels.
-        component: 1 for the largest, 2 for the next, ...; 0 if there must be one
-            alone (specks below 2 % of the whole do not count).
-        name: For the message.
-
-    Raises:
-        ValueError: If there are several and none was chosen, or not so many.
+    Returns:
+        The number of each voxel's part, 1 for the largest, 0 outside; and the parts'
+        sizes in voxels from the largest on, (n,).
     """
-    parts, count = ndimage.label(mask, np.ones((3, 3, 3)))
+    parts, _ = ndimage.label(mask)
     sizes = np.bincount(parts.ravel())[1:]
-    order = np.argsort(sizes)[::-1]
-    serious = int(np.count_nonzero(sizes > 0.02 * sizes.sum()))
-    if component == 0 and serious > 1:
-        shares = ", ".join(f"{100 * sizes[n] / sizes.sum():.0f} %" for n in order[:5])
-        raise ValueError(
-            f"{name}: {serious} tumours that do not touch ({shares} of the whole); "
-            "choose one with component=1 (the largest), 2, ..."
-        )
-    if component > count:
-        raise ValueError(f"{name}: component={component}, but there are {count}")
-    return parts == order[max(component, 1) - 1] + 1
-
-
-def load_mask(
-    path: str | Path,
-    tumour: Sequence[int] = (),
-    critical: Sequence[int] = (),
-    component: int = 0,
-) -> Tissue:
-    """Reads a mask from NRRD, NIfTI or any other file that SimpleITK reads.
-
-    Args:
-        path: The file; its own affine is kept (in the file's frame, LPS).
-        tumour: Labels that are tumour; all but 0 and the critical ones if empty.
-        critical: Labels that must not be touched.
-        component: Which connected part is the tumour, see `one_tumour`.
-
-    Raises:
-        ValueError: If the file cannot be read, or does not hold a tumour.
-    """
-    try:
-        import SimpleITK as sitk
-    except ImportError as error:
-        raise ValueError(
-            f"mask {str(path)!r}: reading masks needs SimpleITK, "
-            "pip install 'trocar[masks]'"
-        ) from error
-    if not Path(path).is_file():
-        raise ValueError(f"mask {str(path)!r}: no such file")
-    try:
-        image = sitk.ReadImage(str(path))
-    except RuntimeError as error:
-        raise ValueError(f"mask {str(path)!r} cannot be read: {error}") from error
-    if image.GetDimension() != 3 or image.GetNumberOfComponentsPerPixel() != 1:
-        raise ValueError(
-            f"mask {str(path)!r} is no image of three axes, one label each"
-        )
-    values = sitk.GetArrayFromImage(image).transpose(2, 1, 0)  # to (x, y, z)
-    there = [int(v) for v in np.unique(values)]
-    for label in [*tumour, *critical]:
-        if label not in there:
-            raise ValueError(
-                f"mask {str(path)!r} has no label {label}; there are {there}"
-            )
-    wanted = tumour or [v for v in there if v != 0 and v not in critical]
-    mask = np.isin(values, wanted)
-    name = Path(path).name
-    if not mask.any():
-        raise ValueError(f"{name}: the mask is empty, no voxel is tumour")
-    labels = np.where(one_tumour(mask, component, name), TUMOUR, BRAIN).astype(np.uint8)
-    labels[np.isin(values, critical)] = CRITICAL
-    X = np.eye(4)
-    direction = np.array(image.GetDirection()).reshape(3, 3)
-    X[:3, :3] = 1e-3 * direction * np.array(image.GetSpacing())
-    X[:3, 3] = 1e-3 * np.array(image.GetOrigin())
-    return Tissue(labels, X, name)
+    order = np.argsort(-sizes, kind="stable")
+    number = np.zeros(len(sizes) + 1, int)
+    number[order + 1] = np.arange(1, len(sizes) + 1)
+    return number[parts], sizes[order]
 
 
 @dataclass
 class SyntheticTumour:
-    """A seeded, irregular, lobed tumour, with a vessel beside it if wanted.
+    """A seeded, irregular, lobed tumour, with a vessel beside it if wanted."""
 
-    Attributes:
-        length: Longest side of its bounding box in m, 0.03 to 0.08.
-        lobes: Number of lobes about its core.
-        roughness: Height of its bumps over its radius.
-        vessel: Radius in m of a critical vessel beside it; 0 for none.
-        vessel_gap: Between the vessel's wall and the tumour's surface, in m.
-        seed: Of its shape.
-    """
-
-    length: float = 0.030
-    lobes: int = 5
-    roughness: float = 0.04
-    vessel: float = 0.0
-    vessel_gap: float = 0.0005
-    seed: int = 1
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        if not 0.005 <= self.length <= 0.1:
-            raise ValueError(
-                f"tumour.length={self.length} m: expected 0.03 to 0.08 (paper, II.B); "
-                f"nearest {min(max(self.length, 0.03), 0.08):g}"
-            )
-        if not 0 <= self.lobes <= 20:
-            raise ValueError(f"tumour.lobes={self.lobes}: expected 0 to 20")
-        for name in ("roughness", "vessel", "vessel_gap"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ValueError(f"tumour.{name}={getattr(self, name)}: expected >= 0")
+    length: float = parameter(
+        0.030,
+        "longest side of its bounding box; 0.03 to 0.08 in the paper (II.B)",
+        "m",
+        least=0.005,
+        most=0.1,
+    )
+    lobes: int = parameter(5, "lobes about its core", least=0, most=20)
+    roughness: float = parameter(
+        0.04, "height of its bumps over its radius", least=0.0, most=0.3
+    )
+    vessel: float = parameter(
+        0.0,
+        "radius of a critical vessel beside it; 0 for none",
+        "m",
+        least=0.0,
+        most=0.01,
+    )
+    vessel_gap: float = parameter(
+        0.0005,
+        "between the vessel's wall and the tumour's surface",
+        "m",
+        least=0.0,
+        most=0.02,
+    )
+    seed: int = parameter(1, "of its shape", least=0, most=2**63 - 1)
 
 
 def _shape(params: SyntheticTumour, points: NDArray) -> NDArray:
@@ -219,7 +157,7 @@ def synthetic_tumour(params: SyntheticTumour, spacing: float = 1.0e-3) -> Tissue
     Returns:
         The tissue, the voxels' axes along those of P.
     """
-    params.check()
+    check(params, "tumour")
     axis = np.linspace(-1.5, 1.5, 61)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     inside = np.argwhere(_shape(params, grid) > 0.0)
@@ -227,7 +165,8 @@ def synthetic_tumour(params: SyntheticTumour, spacing: float = 1.0e-3) -> Tissue
     half = int(math.ceil(1.4 * scale / spacing))
     line = np.arange(-half, half + 1) * spacing
     grid = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1)
-    mask = one_tumour(_shape(params, grid / scale) > 0.0, 1, "synthetic tumour")
+    numbers, _ = parts_by_size(_shape(params, grid / scale) > 0.0)
+    mask = numbers == 1
     labels = mask.astype(np.uint8)
     if params.vessel > 0.0:
         labels[_vessel(params, mask, line, grid)] = CRITICAL

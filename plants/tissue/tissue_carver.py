@@ -3,43 +3,66 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
+from plants.snake.signals import REST, Posture
 from plants.snake.snake_body import CULPRIT, OK, Body, between, body_of, check_body
 from plants.tissue.execution import Execution
-from plants.tissue.labels import CHANNEL, CRITICAL, TUMOUR
+from plants.tissue.labels import CHANNEL, TUMOUR
 from plants.tissue.space import SOLID, Space, in_voxels, stamp
 from plants.tissue.volume import Volume
 from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import along, norm, sub, xyz
+from systems.common.parameter import check, parameter
+from systems.common.signal import Field, flat
 
 
 @dataclass
 class TissueCarverParams:
-    """Parameters of `TissueCarver`.
+    """Parameters of `TissueCarver`."""
 
-    Attributes:
-        period: In s.
-        pitch: Longest way of the tool between two of its stamps, in m.
-    """
+    period: float = parameter(0.02, "of the carving", "s", least=1e-3, most=0.1)
+    pitch: float = parameter(
+        0.25e-3,
+        "longest way of the tool between two of its stamps",
+        "m",
+        least=1e-5,
+        most=1e-3,
+    )
 
-    period: float = 0.02
-    pitch: float = 0.25e-3
 
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(
-                    f"tissue_carver.{name}={value}: expected > 0; the default is "
-                    f"{getattr(TissueCarverParams(), name)}"
-                )
+class Moves(NamedTuple):
+    """How many moves were carved."""
+
+    number: Annotated[float, Field("1", "of them", 0.0)]
+
+
+class Removed(NamedTuple):
+    """What tissue is gone."""
+
+    tumour: Annotated[float, Field("m3", "of the tumour", 0.0)]
+    healthy: Annotated[float, Field("m3", "of any other", 0.0)]
+
+
+class Touched(NamedTuple):
+    """What robot and tool came near to."""
+
+    hits: Annotated[float, Field("1", "checks that found the body in tissue", 0.0)]
+    critical_distance: Annotated[
+        float, Field("m", "least to what is critical, -1 if nothing is", -1.0)
+    ]
+
+
+class Way(NamedTuple):
+    """How far the tool went."""
+
+    length: Annotated[float, Field("m", "of its path", 0.0)]
 
 
 @compiled
@@ -143,9 +166,7 @@ class Carving:
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
         self.body = body_of(params)
-        critical = (volume.labels == CRITICAL).any()
-        distance = volume.distance_to_critical() if critical else np.empty(0)
-        self.critical: NDArray[np.float64] = distance.reshape(-1)
+        self.critical: NDArray[np.float32] = volume.to_critical.reshape(-1)
         self.latest = self.done.index
         self.space: Space = self.volume.space()
 
@@ -174,17 +195,11 @@ class TissueCarver(Block):
     State is the index of the carved moves, the posture there, and the counts; the
     voxels are a memo of it (`Carving`).
 
-    Port ``posture`` accepts s [m], a1, b1, ..., a3, b3 [rad] (7), the snake's true
-    posture.
-
-    Port ``index`` emits how many moves were carved (1).
-
-    Port ``removed`` emits tumour and other tissue removed [m3] (2).
-
-    Port ``touched`` emits how many checks found the body in tissue, and the least
-    distance of robot and tool to what is critical so far [m], -1 if nothing is (2).
-
-    Port ``way`` emits how far the tool went [m] (1).
+    Port ``posture`` accepts the snake's true `Posture`.
+    Port ``index`` emits how many `Moves` were carved.
+    Port ``removed`` emits the tissue `Removed`.
+    Port ``touched`` emits what was `Touched`.
+    Port ``way`` emits the tool's `Way`.
     """
 
     def __init__(
@@ -192,22 +207,21 @@ class TissueCarver(Block):
         params: TissueCarverParams | None = None,
         snake: SnakeParams | None = None,
         carving: Carving | None = None,
-        posture: Sequence[float] = (0.0,) * 7,
+        posture: Sequence[float] = REST,
     ) -> None:
         """Makes the block for tissue, a small block of tumour if None."""
         super().__init__()
-        self._params = params or TissueCarverParams()
-        self._params.check()
-        snake = (snake or SnakeParams()).check()
+        self._params = check(params or TissueCarverParams())
+        snake = check(snake or SnakeParams())
         self.carving = carving or Carving(_example_volume(), snake)
         self._voxel = self.carving.volume.voxel
-        self._posture = self.vector_in("posture", [0.0] * 7)
+        self._posture = self.signal_in("posture", Posture)
         done = self.carving.done
-        self.state_out("index", [done.index])
-        self.state_out("removed", done.removed)
-        self.state_out("touched", done.touched)
-        self.state_out("way", [done.way])
-        self._at = self.DeclareDiscreteState([*posture])
+        self.state_out("index", Moves, flat(Moves(float(done.index))))
+        self.state_out("removed", Removed, flat(done.removed))
+        self.state_out("touched", Touched, flat(done.touched))
+        self.state_out("way", Way, flat(Way(done.way)))
+        self.DeclareDiscreteState([*posture])  # where the snake was
         self.update_every(self._params.period, self._update)
 
     def execution(self, context: Any, posture: int) -> Execution:
@@ -217,39 +231,43 @@ class TissueCarver(Block):
             context: The block's.
             posture: Index of the plan's posture last reached.
         """
-        index, removed, touched, way = (
-            context.get_discrete_state(group).value().tolist() for group in range(4)
-        )
+        (index,), removed, touched, (way,), _ = self._state(context)
+        tumour, healthy = removed
+        hits, nearest = touched
         return Execution(
             posture,
             self.carving.done.time + context.get_time(),
-            int(index[0]),
-            (removed[0], removed[1]),
-            (touched[0], touched[1]),
-            way[0],
+            int(index),
+            (tumour, healthy),
+            (hits, nearest),
+            way,
             self.carving.volume.tau,
         )
 
-    def _update(self, context: Any) -> Sequence[Sequence[float]]:
-        state = [
-            context.get_discrete_state(group).value().tolist() for group in range(5)
-        ]
-        index, removed, touched, way, x0 = state
-        x1 = self._posture.Eval(context).tolist()
+    def _state(self, context: Any) -> list[list[float]]:
+        groups = range(context.num_discrete_state_groups())
+        return [context.get_discrete_state(i).value().tolist() for i in groups]
+
+    def _update(self, context: Any) -> Sequence[Any]:
+        (index,), removed, touched, (way,), before = self._state(context)
+        x = self._posture.Eval(context)
         tumour, healthy, hits, nearest, moved = self.carving.move(
-            int(index[0]), np.array(x0), np.array(x1), self._params.pitch
+            int(index), np.array(before), x, self._params.pitch
         )
+        so_far = Touched(*touched)
         if math.isfinite(nearest):
             nearest = max(nearest, 0.0)
-            nearest = nearest if touched[1] < 0.0 else min(nearest, touched[1])
+            if so_far.critical_distance >= 0.0:
+                nearest = min(nearest, so_far.critical_distance)
         else:
-            nearest = touched[1]
+            nearest = so_far.critical_distance
+        gone = Removed(*removed)
         return (
-            [index[0] + 1.0],
-            [removed[0] + tumour * self._voxel, removed[1] + healthy * self._voxel],
-            [touched[0] + hits, nearest],
-            [way[0] + moved],
-            x1,
+            [index + 1.0],
+            [gone.tumour + tumour * self._voxel, gone.healthy + healthy * self._voxel],
+            [so_far.hits + hits, nearest],
+            [way + moved],
+            x,
         )
 
 

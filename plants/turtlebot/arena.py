@@ -14,9 +14,12 @@ from pydrake.geometry import (
     Sphere,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import BasicVector, LeafSystem
 
 from plants.common.looks import DARK, GREEN, RED, STEEL, illustration
+from plants.crowd.signals import OBSTACLES
+from plants.turtlebot.turtlebot import RobotState
+from systems.common.block import Block
+from systems.common.signal import view
 
 FLOOR = [0.88, 0.89, 0.87, 1.0]
 BODY = [0.12, 0.37, 0.75, 1.0]
@@ -25,11 +28,11 @@ HEIGHT = 0.4
 """Of an obstacle [m]."""
 
 
-class Arena(LeafSystem):
+class Arena(Block):
     """Poses a robot and its obstacles in a SceneGraph.
 
-    Port ``robot`` accepts the body's x, y, heading, speed and turn rate (5).
-    Port ``obstacles`` accepts x, y, radius, v_x, v_y of each obstacle (5 each).
+    Port ``robot`` accepts the `RobotState`.
+    Port ``obstacles`` accepts rows of `Obstacle`.
     Port ``poses`` emits the frames' poses for the SceneGraph (FramePoseVector).
     """
 
@@ -37,7 +40,6 @@ class Arena(LeafSystem):
         self,
         scene_graph: Any,
         radii: Sequence[float],
-        capacity: int,
         radius: float,
         vision: float,
         goal: Sequence[float],
@@ -48,7 +50,6 @@ class Arena(LeafSystem):
         Args:
             scene_graph: Where they are drawn.
             radii: Of the obstacles [m].
-            capacity: Number of obstacles in the port.
             radius: Of the robot [m].
             vision: Radius of its sight [m].
             goal: x, y [m].
@@ -65,10 +66,8 @@ class Arena(LeafSystem):
             frame = self._add_frame(f"obstacle_{k}")
             self._put(frame, Cylinder(r, HEIGHT), (0.0, 0.0, 0.5 * HEIGHT), "disc", RED)
             self._frames.append(frame)
-        example = [0.0, 0.0, 0.0, 0.5, 0.0]
-        self._robot = self.DeclareVectorInputPort("robot", BasicVector(example))
-        rows = [2.0, 0.4, 0.3, 0.0, -0.3] + [0.0] * (5 * (capacity - 1))
-        self._obstacles = self.DeclareVectorInputPort("obstacles", BasicVector(rows))
+        self._robot = self.signal_in("robot", RobotState)
+        self._obstacles = self.signal_in("obstacles", OBSTACLES)
         self.DeclareAbstractOutputPort(
             "poses",
             lambda: Value(FramePoseVector()),
@@ -77,13 +76,15 @@ class Arena(LeafSystem):
         )
 
     def _calc_poses(self, context: Any, output: Any) -> None:
-        x, y, theta = self._robot.Eval(context).tolist()[:3]
+        robot = RobotState(*self._robot.Eval(context).tolist())
         poses = FramePoseVector()
-        R_WR = RotationMatrix.MakeZRotation(theta)
-        poses.set_value(self._robot_frame, RigidTransform(R_WR, [x, y, 0.0]))
-        rows = self._obstacles.Eval(context).tolist()
+        X_WR = RigidTransform(
+            RotationMatrix.MakeZRotation(robot.theta), [robot.x, robot.y, 0.0]
+        )
+        poses.set_value(self._robot_frame, X_WR)
+        obstacles = view(OBSTACLES, self._obstacles.Eval(context))
         for k, frame in enumerate(self._frames):
-            p_WO = [rows[5 * k], rows[5 * k + 1], 0.0]
+            p_WO = [obstacles.x[k], obstacles.y[k], 0.0]
             poses.set_value(frame, RigidTransform(p_WO))
         output.set_value(poses)
 
@@ -98,6 +99,7 @@ class Arena(LeafSystem):
 
     def _draw_floor(self, goal: Sequence[float], floor: Sequence[float]) -> None:
         low_x, low_y, high_x, high_y = floor
+        goal_x, goal_y = goal
         middle = [0.5 * (low_x + high_x), 0.5 * (low_y + high_y), -0.03]
         slab = Box(high_x - low_x, high_y - low_y, 0.05)
         self._graph.RegisterAnchoredGeometry(
@@ -108,7 +110,7 @@ class Arena(LeafSystem):
             ("pole", Cylinder(0.015, 0.6), 0.3),
             ("knob", Sphere(0.06), 0.6),
         ):
-            X_WG = RigidTransform([goal[0], goal[1], z])
+            X_WG = RigidTransform([goal_x, goal_y, z])
             self._graph.RegisterAnchoredGeometry(
                 self.source_id, illustration(shape, X_WG, name, GREEN)
             )

@@ -3,63 +3,69 @@
 It is a `SymbolicVectorSystem`: Drake integrates it in C++.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 from pydrake.symbolic import Variable, cos, max, min, sin
 from pydrake.systems.primitives import SymbolicVectorSystem
 
-STATE = ("x", "y", "theta", "v", "omega")
-"""Places [m], heading [rad], speed [m/s] and turn rate [rad/s]."""
+from systems.common.parameter import check, parameter
+from systems.common.signal import Field
+
+
+class RobotState(NamedTuple):
+    """The body: where it is and how it moves. World frame W, plane z = 0."""
+
+    x: Annotated[float, Field("m", "place", 0.0)]
+    y: Annotated[float, Field("m", "place", 0.0)]
+    theta: Annotated[float, Field("rad", "heading", 0.0)]
+    v: Annotated[float, Field("m/s", "speed, negative backwards", 0.5)]
+    omega: Annotated[float, Field("rad/s", "turn rate", 0.0)]
+
+
+class Command(NamedTuple):
+    """What the body is to do."""
+
+    speed: Annotated[float, Field("m/s", "speed to take", 0.5)]
+    turn_rate: Annotated[float, Field("rad/s", "turn rate to take", 0.0)]
 
 
 @dataclass
 class TurtlebotParams:
     """A TurtleBot 2 (Kobuki base); accelerations as its drivers' usual limits."""
 
-    # Radius of the body [m].
-    radius: float = 0.18
-    # Greatest speed, either way [m/s].
-    speed: float = 0.5
-    # Greatest turn rate [rad/s].
-    turn_rate: float = 1.8
-    # Greatest acceleration [m/s^2].
-    acceleration: float = 1.0
-    # Greatest turn acceleration [rad/s^2].
-    turn_acceleration: float = 3.5
-    # Time constant of the wheels' speed control [s].
-    lag: float = 0.05
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: If one is not positive and finite.
-        """
-        for name, value in vars(self).items():
-            if not (value > 0.0 and isfinite(value)):
-                raise ValueError(f"robot: {name}={value} must be positive and finite")
+    radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
+    speed: float = parameter(0.5, "greatest, either way", "m/s", above=0.0, most=3.0)
+    turn_rate: float = parameter(1.8, "greatest", "rad/s", above=0.0, most=10.0)
+    acceleration: float = parameter(1.0, "greatest", "m/s^2", above=0.0, most=10.0)
+    turn_acceleration: float = parameter(
+        3.5, "greatest", "rad/s^2", above=0.0, most=50.0
+    )
+    # Below its bound the integrator's step of 0.05 s would be unstable.
+    lag: float = parameter(
+        0.05, "time constant of the wheels' speed control", "s", least=0.02, most=1.0
+    )
 
 
-def make_turtlebot(params: TurtlebotParams, start: list[float]) -> Any:
-    """Makes the system; its state is `STATE`.
+def make_turtlebot(params: TurtlebotParams, start: Sequence[float]) -> Any:
+    """Makes the system; its state is a `RobotState`.
 
-    Its input ``u0`` accepts speed and turn rate to take (2); output ``y0`` emits the
-    state (5).
+    Its input ``u0`` accepts a `Command`; output ``y0`` emits the `RobotState`.
 
     Args:
         params: Limits.
         start: x, y [m] and heading [rad].
 
     Raises:
-        ValueError: If a parameter is out of range.
+        ParameterError: If a parameter is out of range.
     """
-    params.check()
-    x, y, theta, v, omega = (Variable(name) for name in STATE)
-    speed, rate = Variable("speed"), Variable("rate")
+    check(params, "robot")
+    start_x, start_y, start_theta = start
+    x, y, theta, v, omega = (Variable(name) for name in RobotState._fields)
+    speed, rate = (Variable(name) for name in Command._fields)
     # A context starts at zero: the start stands in the equations.
-    heading = theta + start[2]
+    heading = theta + start_theta
 
     def follow(value: Any, wanted: Any, most: float, fastest: float) -> Any:
         """Rate of change towards a wanted value: first order, twice limited."""
@@ -69,7 +75,7 @@ def make_turtlebot(params: TurtlebotParams, start: list[float]) -> Any:
     return SymbolicVectorSystem(
         state=[x, y, theta, v, omega],
         input=[speed, rate],
-        output=[x + start[0], y + start[1], heading, v, omega],
+        output=[x + start_x, y + start_y, heading, v, omega],
         dynamics=[
             v * cos(heading),
             v * sin(heading),

@@ -10,30 +10,19 @@ constant 1/B and dies out when O stops, as the text says.
 O stops.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from math import exp
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import (
-    Vector,
-    all_finite,
-    along,
-    shaft_point_velocity,
-    sub,
-    unit,
-    xyz,
-)
-from systems.common.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    fulcrum,
-    usable,
-    velocity,
-)
+from systems.auto_guidance.nearest import obstacle_at
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import along, shaft_point_velocity, sub, unit
+from systems.common.parameter import check, parameter
+from systems.common.signal import Many, Vector
+from systems.common.signals import Estimate, Guide, Velocity, finite_guide, usable
 from systems.common.step_block import StepBlock
 
 FORMS = ("corrected", "printed")
@@ -41,47 +30,32 @@ FORMS = ("corrected", "printed")
 
 @dataclass
 class BackwardMovementParams:
-    """Parameters of `BackwardMovement`.
+    """Parameters of `BackwardMovement`."""
 
-    Attributes:
-        form: "corrected" or "printed".
-        period: Of the update, s.
-        gain: B, 1/s: how fast the robot takes up the obstacle's velocity.
-    """
+    form: str = parameter("corrected", "of equation (5)", choices=FORMS)
+    period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
+    gain: float = parameter(
+        20.0, "B: how fast R takes up O's velocity", "1/s", above=0.0, most=1e3
+    )
 
-    form: str = "corrected"
-    period: float = 1.0 / 60.0
-    gain: float = 20.0
 
-    def check(self) -> None:
-        """Checks the values.
+class State(NamedTuple):
+    """v_3 in m/s, and the time of the last update in s."""
 
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        if self.form not in FORMS:
-            raise ValueError(f"form={self.form!r} must be one of {', '.join(FORMS)}")
-        for name in ("period", "gain"):
-            value = getattr(self, name)
-            if not 0.0 < value < float("inf"):
-                raise ValueError(f"{name}={value} must be finite and > 0")
+    v3: Vector
+    time: float
 
 
 @compiled
-def contact_velocity(guide: Numbers, obstacle: Numbers) -> Vector:
-    """v_O, the velocity of O's material point M_O, m/s.
-
-    Args:
-        guide: The guide signal (12).
-        obstacle: A usable estimate (17) of O.
-    """
-    o = unit(sub(xyz(obstacle, 0), fulcrum(obstacle)))
-    return shaft_point_velocity(guide[8], o, velocity(obstacle))
+def contact_velocity(guide: Guide, obstacle: Estimate) -> Vector:
+    """v_O, the velocity of O's material point M_O, m/s; of a usable estimate."""
+    o = unit(sub(obstacle.p, obstacle.fulcrum))
+    return shaft_point_velocity(guide.l_over_L, o, obstacle.v)
 
 
 @compiled
 def backward_movement(
-    params: Any, v3: Numbers, dt: float, guide: Numbers, obstacle: Numbers
+    params: Any, v3: Vector, dt: float, guide: Guide, obstacle: Estimate
 ) -> Vector:
     """One step of the behaviour.
 
@@ -89,14 +63,14 @@ def backward_movement(
         params: A record of `constants`.
         v3: v_3 before the step, m/s.
         dt: Length of the step, s.
-        guide: The guide signal (12).
-        obstacle: Estimate (17) of O; without a usable one v_O counts as zero.
+        guide: The guide point.
+        obstacle: Of O; without a usable estimate v_O counts as zero.
 
     Returns:
         v_3 after the step, m/s.
     """
     v_o = (0.0, 0.0, 0.0)
-    if usable(obstacle) and all_finite(guide):
+    if usable(obstacle) and finite_guide(guide):
         v_o = contact_velocity(guide, obstacle)
     if params.printed:
         return along(v3, params.gain * dt, v_o)
@@ -106,21 +80,17 @@ def backward_movement(
 
 def constants(params: BackwardMovementParams) -> np.ndarray:
     """The parameters as the compiled functions take them."""
+    check(params)
     return packed(params, printed=params.form == "printed")
 
 
 @compiled
 def _step(
-    record: np.ndarray,
-    state: np.ndarray,
-    time: float,
-    guide: np.ndarray,
-    obstacle: np.ndarray,
-) -> np.ndarray:
-    """The next state, v_3 and the time (4), and v_3 (3)."""
-    dt = time - state[3]
-    v3 = backward_movement(record[0], xyz(state, 0), dt, guide, obstacle)
-    return np.array(v3 + (time,) + v3)
+    params: Any, state: State, time: float, guide: Guide, obstacles: np.ndarray
+) -> tuple[State, Velocity]:
+    obstacle = obstacle_at(guide, obstacles)
+    v3 = backward_movement(params, state.v3, time - state.time, guide, obstacle)
+    return State(v3, time), Velocity(v3)
 
 
 class BackwardMovement(StepBlock):
@@ -128,30 +98,32 @@ class BackwardMovement(StepBlock):
 
     Bauzano et al., section 4.3, equation (5); see the module.
 
-    Port ``guide`` accepts the guide signal (12).
-    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
-    Port ``v3`` emits v_3 (3), the retreat of the guide point, m/s, in W.
-
-    The discrete state is v_3 (3) and the time of the last update. The output
-    is that of the step from then to now: no sample of delay.
+    Port ``guide`` accepts the `Guide`.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
+    Port ``v3`` emits v_3, the retreat of the guide point, a `Velocity`.
     """
 
-    def __init__(self, params: BackwardMovementParams | None = None) -> None:
+    def __init__(
+        self,
+        params: BackwardMovementParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
         params = params or BackwardMovementParams()
-        params.check()
         self.declare_step(
-            partial(_step, constants(params)),
-            {"guide": GUIDE_EXAMPLE, "obstacle": OBSTACLE_EXAMPLE},
-            [0.0, 0.0, 0.0, -params.period],
-            {"v3": 3},
+            _step,
+            [constants(params)],
+            {"guide": Guide, "obstacles": Many(Estimate, tuple(obstacles))},
+            State((0.0, 0.0, 0.0), -params.period),
+            {"v3": Velocity},
             params.period,
         )

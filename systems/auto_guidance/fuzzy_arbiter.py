@@ -24,36 +24,62 @@ An obstacle at rest has no direction, and is left to the field.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
+from itertools import pairwise
 from math import sqrt
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from systems.auto_guidance.backward_movement import contact_velocity
-from systems.common.compiled import Numbers, compiled, packed
+from systems.auto_guidance.nearest import obstacle_at
+from systems.common.compiled import compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
-    Vector,
+    across,
     all_finite,
     along,
     any_perpendicular,
     dot,
     limited,
     norm,
+    over,
+    plus,
+    scaled,
     sub,
     unit,
-    xyz,
 )
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Field, Many, Vector, reader
 from systems.common.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
+    Estimate,
+    Guide,
+    RobotTool,
+    Velocity,
+    finite_guide,
+    finite_tool,
     usable,
 )
 from systems.common.step_block import StepBlock
+
+
+class Weights(NamedTuple):
+    """What the behaviours count in equation (6)."""
+
+    c1: Annotated[float, Field("1", "of go to target", 1.0)]
+    c2: Annotated[float, Field("1", "of the velocity corrections", 0.0)]
+    c3: Annotated[float, Field("1", "of the backward movement", 0.0)]
+
+
+read_weights = reader(Weights)
+
+
+class State(NamedTuple):
+    """v_R / s in m/s, and the time of the last update in s."""
+
+    v_tip: Vector
+    time: float
+
 
 TABLE_I = [
     ["A", "FA", "HC", "C"],
@@ -74,71 +100,55 @@ WEIGHT_TABLE = [
 """Rows: DECISIONS; columns: DISTANCES."""
 
 WEIGHTS = {
-    "go": [1.0, 0.0, 0.0],
-    "correct": [1.0, 1.0, 0.0],
-    "follow": [1.0, 1.0, 1.0],
+    "go": Weights(1.0, 0.0, 0.0),
+    "correct": Weights(1.0, 1.0, 0.0),
+    "follow": Weights(1.0, 1.0, 1.0),
 }
-"""(c_1, c_2, c_3) of each conclusion."""
 
 TABLES = ("literal", "gated")
 
 
 @dataclass
 class FuzzyArbiterParams:
-    """Parameters of `FuzzyArbiter`.
+    """Parameters of `FuzzyArbiter`."""
 
-    Attributes:
-        table: "literal" or "gated".
-        period: Of the update, s.
-        distances: Centers of close, near and far, m, in rho less the contact
-            distance.
-        contact_distance: rho at contact, m: the sum of both tools' radii.
-        moving_speed: Speed from which on a direction counts in full, m/s. Of the
-            tip for the robot, in proportion below; of M_O for the obstacle, not at
-            all below half of it.
-        closing_speed: Closing speed at which the gated table counts in full, m/s.
-        max_speed: v_max of the tip, m/s.
-        max_acceleration: Of the tip's commanded velocity, m/s^2.
-    """
+    table: str = parameter("gated", "how Table I is read", choices=TABLES)
+    period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
+    distances: list[float] = parameter(
+        [0.01, 0.025, 0.05],
+        f"centers of {', '.join(DISTANCES)}, in rho less the contact distance",
+        "m",
+        least=0.0,
+        most=0.5,
+        shape=(3,),
+    )
+    contact_distance: float = parameter(
+        0.005, "rho at contact: the sum of both tools' radii", "m", least=0.0, most=0.02
+    )
+    moving_speed: float = parameter(
+        0.01,
+        "speed from which on a direction counts in full: of the tip for the robot, in "
+        "proportion below; of M_O for the obstacle, not at all below half of it",
+        "m/s",
+        above=0.0,
+        most=0.1,
+    )
+    closing_speed: float = parameter(
+        0.01,
+        "closing speed at which the gated table counts in full",
+        "m/s",
+        above=0.0,
+        most=0.1,
+    )
+    max_speed: float = parameter(0.06, "v_max of the tip", "m/s", above=0.0, most=0.5)
+    max_acceleration: float = parameter(
+        1.0, "of the tip's commanded velocity", "m/s^2", above=0.0, most=10.0
+    )
 
-    table: str = "gated"
-    period: float = 1.0 / 60.0
-    distances: list[float] = field(default_factory=lambda: [0.01, 0.025, 0.05])
-    contact_distance: float = 0.005
-    moving_speed: float = 0.01
-    closing_speed: float = 0.01
-    max_speed: float = 0.06
-    max_acceleration: float = 1.0
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        if self.table not in TABLES:
-            raise ValueError(f"table={self.table!r} must be one of {', '.join(TABLES)}")
-        if len(self.distances) != 3 or not (
-            0.0 <= self.distances[0] < self.distances[1] < self.distances[2]
-        ):
-            raise ValueError(
-                f"distances={self.distances} must be 3 increasing values >= 0, for "
-                f"{', '.join(DISTANCES)}"
-            )
-        for name in (
-            "period",
-            "moving_speed",
-            "closing_speed",
-            "max_speed",
-            "max_acceleration",
-        ):
-            value = getattr(self, name)
-            if not 0.0 < value < float("inf"):
-                raise ValueError(f"{name}={value} must be finite and > 0")
-        if not 0.0 <= self.contact_distance < float("inf"):
-            raise ValueError(
-                f"contact_distance={self.contact_distance} must be finite and >= 0"
-            )
+    def rules(self) -> Rules:
+        """What must hold across the parameters."""
+        is_rising = all(a < b for a, b in pairwise(self.distances))
+        yield is_rising, "distances", "increasing numbers"
 
 
 @compiled
@@ -162,27 +172,23 @@ def quadrants(x: float, y: float, moving_speed: float) -> np.ndarray:
 
 
 @compiled
-def axes(guide: Numbers) -> tuple[Vector, Vector]:
+def axes(guide: Guide) -> tuple[Vector, Vector]:
     """The quadrants' axes x, y (unit vectors); see the module.
 
     Where the tools' axes touch or the goal lies along y, a fixed perpendicular
     stands in for the direction that is missing.
-
-    Args:
-        guide: The guide signal (12).
     """
-    m_r = xyz(guide, 0)
-    goal = sub(xyz(guide, 9), m_r)
-    y = unit(sub(xyz(guide, 3), m_r), any_perpendicular(goal))
-    across = along(goal, -dot(goal, y), y)
-    size = norm(across)
-    if size < 1e-6:
+    goal = sub(guide.M_Rf, guide.M_R)
+    y = unit(sub(guide.M_O, guide.M_R), any_perpendicular(goal))
+    sideways = across(goal, y)
+    if norm(sideways) < 1e-6:
         return any_perpendicular(y), y
-    return (across[0] / size, across[1] / size, across[2] / size), y
+    return unit(sideways), y
 
 
 def constants(params: FuzzyArbiterParams) -> np.ndarray:
     """The parameters and both tables as the compiled functions take them."""
+    check(params)
     # Table I concludes with a label, not with a number.
     table_i = RuleTable(TABLE_I, {label: [] for label in DECISIONS})
     weights = RuleTable(WEIGHT_TABLE, WEIGHTS)
@@ -201,53 +207,51 @@ def decision_labels(
 ) -> np.ndarray:
     """Table I: degrees of DECISIONS for two velocities on the axes x, y, m/s."""
     slow = params.moving_speed
-    rows, columns = quadrants(v_o[0], v_o[1], slow), quadrants(v_r[0], v_r[1], slow)
-    return activations(params.table_i, 4, rows, columns)
+    return activations(params.table_i, 4, quadrants(*v_o, slow), quadrants(*v_r, slow))
 
 
 @compiled
-def label_weights(params: Any, labels: np.ndarray, distance: float) -> Vector:
-    """(c_1, c_2, c_3) for degrees of DECISIONS at a distance in m."""
+def label_weights(params: Any, labels: np.ndarray, distance: float) -> Weights:
+    """The weights for degrees of DECISIONS at a distance in m."""
     near = degrees(params.distances, distance)
     weight = activations(params.weight_table, len(params.weights), labels, near)
-    return xyz(weighted_mean(weight, params.weights), 0)
+    return read_weights(weighted_mean(weight, params.weights))
 
 
 @compiled
-def decision(params: Any, v1: Numbers, guide: Numbers, obstacle: Numbers) -> Vector:
-    """(c_1, c_2, c_3) for finite inputs and a known obstacle.
+def decision(params: Any, v1: Vector, guide: Guide, obstacle: Estimate) -> Weights:
+    """The weights for finite inputs and a known obstacle.
 
     Args:
         params: A record of `constants`.
         v1: v_1, m/s.
-        guide: The guide signal (12).
-        obstacle: Estimate (17) of O.
+        guide: The guide point.
+        obstacle: Of O.
     """
     v_o = contact_velocity(guide, obstacle)
     # The tremor and the estimate's noise of a tool at rest do not count.
     alert = min(1.0, 2.0 * norm(v_o) / params.moving_speed - 1.0)
     if alert <= 0.0:
-        return 1.0, 0.0, 0.0
+        return Weights(1.0, 0.0, 0.0)
     x, y = axes(guide)
     r_y, o_y = dot(v1, y), dot(v_o, y)
     if params.gated:
         alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
     if alert <= 0.0:
-        return 1.0, 0.0, 0.0
-    s = guide[7]
+        return Weights(1.0, 0.0, 0.0)
+    s = guide.s
     labels = decision_labels(params, (dot(v1, x) / s, r_y / s), (dot(v_o, x), o_y))
-    distance = guide[6] - params.contact_distance
-    c1, c2, c3 = label_weights(params, labels, distance)
-    return 1.0 + alert * (c1 - 1.0), alert * c2, alert * c3
+    c = label_weights(params, labels, guide.rho - params.contact_distance)
+    return Weights(1.0 + alert * (c.c1 - 1.0), alert * c.c2, alert * c.c3)
 
 
 @compiled
 def commanded_velocity(
     params: Any,
-    v_tip: Numbers,
+    v_tip: Vector,
     dt: float,
-    weights: Numbers,
-    velocities: Sequence[Numbers],
+    weights: Weights,
+    velocities: tuple[Vector, Vector, Vector],
     s: float,
 ) -> Vector:
     """v_R / s of equation (6), the tip's velocity, within its limits, m/s.
@@ -256,31 +260,27 @@ def commanded_velocity(
         params: A record of `constants`.
         v_tip: v_R / s before the step, m/s.
         dt: Length of the step, s.
-        weights: (c_1, c_2, c_3).
+        weights: c_1, c_2, c_3.
         velocities: v_1, v_2, v_3, m/s.
         s: Proportion of the guide point.
     """
-    (a, b, c), (v1, v2, v3) = weights, velocities
-    wanted = (
-        (a * v1[0] + b * v2[0] + c * v3[0]) / s,
-        (a * v1[1] + b * v2[1] + c * v3[1]) / s,
-        (a * v1[2] + b * v2[2] + c * v3[2]) / s,
-    )
-    change = sub(limited(wanted, params.max_speed), v_tip)
-    return along(v_tip, 1.0, limited(change, params.max_acceleration * dt))
+    v1, v2, v3 = velocities
+    v_r = along(along(scaled(weights.c1, v1), weights.c2, v2), weights.c3, v3)
+    change = sub(limited(over(v_r, s), params.max_speed), v_tip)
+    return plus(v_tip, limited(change, params.max_acceleration * dt))
 
 
 @compiled
 def arbitrate(
     params: Any,
-    v_tip: Numbers,
+    v_tip: Vector,
     dt: float,
-    velocities: tuple[Numbers, Numbers, Numbers],
-    guide: Numbers,
-    robot_tool: Numbers,
-    obstacle: Numbers,
-    target: Numbers,
-) -> tuple[Vector, Vector, float]:
+    velocities: tuple[Vector, Vector, Vector],
+    guide: Guide,
+    robot: RobotTool,
+    obstacle: Estimate,
+    target: Estimate,
+) -> tuple[Weights, Vector, float]:
     """One step of the block: decision, sum and limits.
 
     Args:
@@ -288,52 +288,51 @@ def arbitrate(
         v_tip: v_R / s before the step, m/s.
         dt: Length of the step, s.
         velocities: v_1, v_2, v_3, m/s.
-        guide: The guide signal (12).
-        robot_tool: G_R, P_R (6), m.
-        obstacle: Estimate (17) of O.
-        target: Estimate (17) of S.
+        guide: The guide point.
+        robot: R.
+        obstacle: Of O.
+        target: Of S.
 
     Returns:
-        (weights, v_R / s in m/s, s).
+        The weights, v_R / s in m/s, and s.
     """
     v1, v2, v3 = velocities
     known = usable(obstacle) and usable(target)
     moves = all_finite(v1) and all_finite(v2) and all_finite(v3)
-    if not (known and moves and all_finite(guide) and all_finite(robot_tool)):
-        s = guide[7] if all_finite(guide) else 1.0
-        change = limited(sub((0.0, 0.0, 0.0), v_tip), params.max_acceleration * dt)
-        return (0.0, 0.0, 0.0), along(v_tip, 1.0, change), s
+    is_there = finite_guide(guide)
+    if not (known and moves and is_there and finite_tool(robot)):
+        s = guide.s if is_there else 1.0
+        change = limited(scaled(-1.0, v_tip), params.max_acceleration * dt)
+        return Weights(0.0, 0.0, 0.0), plus(v_tip, change), s
     weights = decision(params, v1, guide, obstacle)
-    s = guide[7]
-    return weights, commanded_velocity(params, v_tip, dt, weights, velocities, s), s
+    v = commanded_velocity(params, v_tip, dt, weights, velocities, guide.s)
+    return weights, v, guide.s
 
 
 @compiled
 def _step(
-    record: np.ndarray,
-    state: np.ndarray,
+    params: Any,
+    state: State,
     time: float,
-    v1: np.ndarray,
-    v2: np.ndarray,
-    v3: np.ndarray,
-    guide: np.ndarray,
-    robot_tool: np.ndarray,
-    obstacle: np.ndarray,
-    target: np.ndarray,
-) -> np.ndarray:
-    """The next state (4), the weights (3) and v_R (3)."""
+    v1: Velocity,
+    v2: Velocity,
+    v3: Velocity,
+    guide: Guide,
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+) -> tuple[State, Weights, Velocity]:
     weights, v_tip, s = arbitrate(
-        record[0],
-        xyz(state, 0),
-        time - state[3],
-        (xyz(v1, 0), xyz(v2, 0), xyz(v3, 0)),
+        params,
+        state.v_tip,
+        time - state.time,
+        (v1.v, v2.v, v3.v),
         guide,
-        robot_tool,
-        obstacle,
+        robot,
+        obstacle_at(guide, obstacles),
         target,
     )
-    v_r = along((0.0, 0.0, 0.0), s, v_tip)
-    return np.array(v_tip + (time,) + weights + v_r)
+    return State(v_tip, time), weights, Velocity(scaled(s, v_tip))
 
 
 class FuzzyArbiter(StepBlock):
@@ -343,45 +342,48 @@ class FuzzyArbiter(StepBlock):
     estimate is not known or an input is not finite, the weights are zero and the
     robot slows down to rest at the maximum acceleration.
 
-    Port ``v1`` accepts v_1 (3) of go to target, m/s, in W.
-    Port ``v2`` accepts v_2 (3) of the velocity corrections, m/s, in W.
-    Port ``v3`` accepts v_3 (3) of the backward movement, m/s, in W.
-    Port ``guide`` accepts the guide signal (12).
-    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
-    (6), m, in W.
-    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
-    Port ``target`` accepts the estimate (17) of the target tool S.
-    Port ``weights`` emits c_1, c_2, c_3 (3).
-    Port ``v_R`` emits the commanded velocity of the guide point (3), m/s, in W.
+    Port ``v1`` accepts v_1 of go to target, a `Velocity` of the guide point.
+    Port ``v2`` accepts v_2 of the velocity corrections, a `Velocity`.
+    Port ``v3`` accepts v_3 of the backward movement, a `Velocity`.
+    Port ``guide`` accepts the `Guide`.
+    Port ``robot_tool`` accepts the `RobotTool`.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
+    Port ``target`` accepts the `Estimate` of the target tool S.
+    Port ``weights`` emits the `Weights`.
+    Port ``v_R`` emits the commanded `Velocity` of the guide point.
 
-    The discrete state is v_R / s (3) and the time of the last update. The output
-    is that of the step from then to now: no sample of delay.
+    The outputs are those of the step from the last update to now: no sample of delay.
     """
 
-    def __init__(self, params: FuzzyArbiterParams | None = None) -> None:
+    def __init__(
+        self,
+        params: FuzzyArbiterParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
         params = params or FuzzyArbiterParams()
-        params.check()
         self.declare_step(
-            partial(_step, constants(params)),
+            _step,
+            [constants(params)],
             {
-                "v1": [0.05, 0.0, 0.0],
-                "v2": [-0.01, 0.0, 0.0],
-                "v3": [0.0, -0.01, 0.0],
-                "guide": GUIDE_EXAMPLE,
-                "robot_tool": ROBOT_TOOL_EXAMPLE,
-                "obstacle": OBSTACLE_EXAMPLE,
-                "target": TARGET_EXAMPLE,
+                "v1": Velocity,
+                "v2": Velocity,
+                "v3": Velocity,
+                "guide": Guide,
+                "robot_tool": RobotTool,
+                "obstacles": Many(Estimate, tuple(obstacles)),
+                "target": Estimate,
             },
-            [0.0, 0.0, 0.0, -params.period],
-            {"weights": 3, "v_R": 3},
+            State((0.0, 0.0, 0.0), -params.period),
+            {"weights": Weights, "v_R": Velocity},
             params.period,
         )

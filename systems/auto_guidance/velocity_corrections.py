@@ -14,35 +14,31 @@ An obstacle that stands has no crossing time: v_2 = 0, it is the potential
 field's task (the paper's static case).
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from math import exp, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.block import Block
-from systems.common.compiled import Numbers, compiled, packed
+from systems.auto_guidance.nearest import obstacle_at
+from systems.common.compiled import compiled, packed
 from systems.common.fuzzy import RuleTable, activations, degrees, weighted_mean
 from systems.common.geometry import (
-    Vector,
     all_finite,
     along,
     cross,
     dot,
     norm,
+    scaled,
     sub,
     unit,
-    xyz,
 )
-from systems.common.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    acceleration,
-    fulcrum,
-    usable,
-    velocity,
-)
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Many, Vector
+from systems.common.signals import Estimate, Guide, Velocity, finite_guide, usable
+from systems.common.step_block import StepBlock
 
 DISTANCES = ["Z", "AZ", "M", "F", "VF"]
 TIMES = ["Z", "AZ", "M", "L", "VL"]
@@ -60,63 +56,72 @@ TABLE_II = [
 
 @dataclass
 class VelocityCorrectionsParams:
-    """Parameters of `VelocityCorrections`. The paper gives the labels only.
+    """Parameters of `VelocityCorrections`. The paper gives the labels only."""
 
-    Attributes:
-        distances: Centers of the DISTANCES Z, AZ, M, F, VF, m.
-        times: Centers of the TIMES Z, AZ, M, L, VL, s.
-        scales: Share of v_1 that is kept for the SPEEDS S, AS, SM, NM, FM, MM.
-        horizon: How far ahead O is predicted, s; a crossing in the last quarter
-            counts in part.
-        acceleration_time: Time constant with which O's acceleration is taken to
-            die out, s.
-        moving_speed: Speed of O's tip from which on corrections count in full,
-            m/s; not at all below half of it.
-        near_distance: How near the way must come to the swept triangle, m; a
-            passage shorter than this counts in part.
-    """
-
-    distances: list[float] = field(
-        default_factory=lambda: [0.0, 0.01, 0.025, 0.05, 0.08]
+    distances: list[float] = parameter(
+        [0.0, 0.01, 0.025, 0.05, 0.08],
+        f"centers of the distances {', '.join(DISTANCES)}",
+        "m",
+        least=0.0,
+        most=0.5,
+        shape=(5,),
     )
-    times: list[float] = field(default_factory=lambda: [0.0, 0.25, 0.5, 1.0, 2.0])
-    scales: list[float] = field(
-        default_factory=lambda: [0.0, 0.1, 0.25, 0.5, 0.75, 1.0]
+    times: list[float] = parameter(
+        [0.0, 0.25, 0.5, 1.0, 2.0],
+        f"centers of the times {', '.join(TIMES)}",
+        "s",
+        least=0.0,
+        most=10.0,
+        shape=(5,),
     )
-    horizon: float = 2.0
-    acceleration_time: float = 0.2
-    moving_speed: float = 0.01
-    near_distance: float = 0.01
+    scales: list[float] = parameter(
+        [0.0, 0.1, 0.25, 0.5, 0.75, 1.0],
+        f"share of v_1 that is kept for the speeds {', '.join(SPEEDS)}",
+        least=0.0,
+        most=1.0,
+        shape=(6,),
+    )
+    horizon: float = parameter(
+        2.0,
+        "how far ahead O is predicted; a crossing in the last quarter counts in part",
+        "s",
+        above=0.0,
+        most=10.0,
+    )
+    acceleration_time: float = parameter(
+        0.2,
+        "time constant with which O's acceleration is taken to die out",
+        "s",
+        above=0.0,
+        most=5.0,
+    )
+    moving_speed: float = parameter(
+        0.01,
+        "speed of O's tip from which on they count in full; not at all below half",
+        "m/s",
+        above=0.0,
+        most=0.1,
+    )
+    near_distance: float = parameter(
+        0.01,
+        "how near the way must come to the swept triangle; a passage shorter than this "
+        "counts in part",
+        "m",
+        above=0.0,
+        most=0.1,
+    )
 
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        for name, labels in (
-            ("distances", DISTANCES),
-            ("times", TIMES),
-            ("scales", SPEEDS),
-        ):
+    def rules(self) -> Rules:
+        """What must hold across the parameters."""
+        for name in ("distances", "times", "scales"):
             values = getattr(self, name)
-            if len(values) != len(labels) or not values[0] >= 0.0:
-                raise ValueError(
-                    f"{name}={values} must be {len(labels)} values >= 0, for "
-                    f"{', '.join(labels)}"
-                )
-            if not all(a < b for a, b in pairwise(values)):
-                raise ValueError(f"{name}={values} must increase")
-        if self.scales[0] != 0.0 or self.scales[-1] != 1.0:
-            raise ValueError(f"scales={self.scales} must start at 0 and end at 1")
-        for name in ("horizon", "acceleration_time", "moving_speed", "near_distance"):
-            value = getattr(self, name)
-            if not 0.0 < value < float("inf"):
-                raise ValueError(f"{name}={value} must be finite and > 0")
+            yield all(a < b for a, b in pairwise(values)), name, "increasing numbers"
+        ends = (self.scales[0], self.scales[-1])
+        yield ends == (0.0, 1.0), "scales", "0 at the start and 1 at the end"
 
 
 @compiled
-def predicted_tip(obstacle: Numbers, ahead: float, acceleration_time: float) -> Vector:
+def predicted_tip(obstacle: Estimate, ahead: float, acceleration_time: float) -> Vector:
     """O's tip `ahead` seconds from now, m.
 
     The acceleration is taken to die out (Singer's model): held constant over
@@ -124,39 +129,40 @@ def predicted_tip(obstacle: Numbers, ahead: float, acceleration_time: float) -> 
     """
     tau = acceleration_time
     share = tau * tau * (ahead / tau - 1.0 + exp(-ahead / tau))
-    return along(
-        along(xyz(obstacle, 0), ahead, velocity(obstacle)),
-        share,
-        acceleration(obstacle),
-    )
+    return along(along(obstacle.p, ahead, obstacle.v), share, obstacle.a)
+
+
+class Crossing(NamedTuple):
+    """Where and when O's shaft crosses the guide point's way.
+
+    Attributes:
+        distance: From M_R, m.
+        time: From now, s.
+        degree: To which there is a crossing, in [0, 1].
+    """
+
+    distance: float
+    time: float
+    degree: float
 
 
 @compiled
-def crossing(
-    guide: Numbers,
-    v1: Numbers,
-    obstacle: Numbers,
-    params: Any,
-) -> tuple[float, float, float]:
-    """Where and when O's shaft crosses the guide point's way.
+def crossing(guide: Guide, v1: Vector, obstacle: Estimate, params: Any) -> Crossing:
+    """Where and when O's shaft crosses the guide point's way, if it does.
 
     Args:
-        guide: The guide signal (12).
+        guide: The guide point.
         v1: Velocity of the guide point, m/s.
-        obstacle: Estimate (17) of O.
+        obstacle: Of O.
         params: A record of `constants`.
-
-    Returns:
-        (distance from M_R in m, time from now in s, degree in [0, 1] to which
-        there is a crossing); degree 0 if there is none.
     """
-    none = (0.0, 0.0, 0.0)
+    none = Crossing(0.0, 0.0, 0.0)
     speed = norm(v1)
-    moving = 2.0 * norm(velocity(obstacle)) / params.moving_speed - 1.0
+    moving = 2.0 * norm(obstacle.v) / params.moving_speed - 1.0
     if speed < 1e-9 or moving <= 0.0:
         return none
-    g = fulcrum(obstacle)
-    a = sub(xyz(obstacle, 0), g)
+    g = obstacle.fulcrum
+    a = sub(obstacle.p, g)
     b = sub(predicted_tip(obstacle, params.horizon, params.acceleration_time), g)
     n = cross(a, b)
     n2 = dot(n, n)
@@ -164,7 +170,7 @@ def crossing(
         return none
     # At the distance d on the way, over the plane of the sweep by h:
     # foot = alpha a + beta b, h = h0 + h1 d, alpha and beta likewise.
-    m = sub(xyz(guide, 0), g)
+    m = sub(guide.M_R, g)
     e = unit(v1)
     size = sqrt(n2)
     h0, h1 = dot(m, n) / size, dot(e, n) / size
@@ -172,7 +178,7 @@ def crossing(
     alpha0, alpha1 = dot(m, b_n) / n2, dot(e, b_n) / n2
     beta0, beta1 = dot(m, n_a) / n2, dot(e, n_a) / n2
     near = params.near_distance
-    low, high = 0.0, norm(sub(xyz(guide, 9), xyz(guide, 0))) + near
+    low, high = 0.0, norm(sub(guide.M_Rf, guide.M_R)) + near
     for c0, c1 in (
         (near - h0, -h1),
         (near + h0, h1),
@@ -201,11 +207,12 @@ def crossing(
         2.0 * (1.0 - height / near),
         4.0 * (1.0 - time / params.horizon),
     )
-    return (low, time, degree) if degree > 0.0 else none
+    return Crossing(low, time, degree) if degree > 0.0 else none
 
 
 def constants(params: VelocityCorrectionsParams) -> np.ndarray:
     """The parameters and Table II as the compiled functions take them."""
+    check(params)
     scales = {s: [x] for s, x in zip(SPEEDS, params.scales, strict=True)}
     return packed(params, table=RuleTable(TABLE_II, scales).cells)
 
@@ -226,75 +233,68 @@ def speed_scale(params: Any, distance: float, time: float) -> float:
 
 @compiled
 def velocity_correction(
-    params: Any, v1: Numbers, guide: Numbers, obstacle: Numbers
+    params: Any, v1: Vector, guide: Guide, obstacle: Estimate
 ) -> Vector:
     """v_2, m/s; zero where O is not known.
 
     Args:
         params: A record of `constants`.
         v1: Velocity of the guide point, m/s.
-        guide: The guide signal (12).
-        obstacle: Estimate (17) of O.
+        guide: The guide point.
+        obstacle: Of O.
     """
-    if not (usable(obstacle) and all_finite(v1) and all_finite(guide)):
+    if not (usable(obstacle) and all_finite(v1) and finite_guide(guide)):
         return 0.0, 0.0, 0.0
-    distance, time, degree = crossing(guide, v1, obstacle, params)
-    if degree <= 0.0:
+    there = crossing(guide, v1, obstacle, params)
+    if there.degree <= 0.0:
         return 0.0, 0.0, 0.0
-    cut = -degree * (1.0 - speed_scale(params, distance, time))
-    return cut * v1[0], cut * v1[1], cut * v1[2]
+    kept = speed_scale(params, there.distance, there.time)
+    return scaled(-there.degree * (1.0 - kept), v1)
 
 
 @compiled
-def _v2(
-    record: np.ndarray, v1: np.ndarray, guide: np.ndarray, obstacle: np.ndarray
-) -> np.ndarray:
-    return np.array(velocity_correction(record[0], xyz(v1, 0), guide, obstacle))
+def _correct(
+    params: Any, v1: Velocity, guide: Guide, obstacles: np.ndarray
+) -> tuple[Velocity]:
+    obstacle = obstacle_at(guide, obstacles)
+    return (Velocity(velocity_correction(params, v1.v, guide, obstacle)),)
 
 
-class VelocityCorrections(Block):
+class VelocityCorrections(StepBlock):
     """Slows the robot's tool where the obstacle tool is about to cross its way.
 
     Bauzano et al., section 4.2, Table II; see the module. A pure map of its
     inputs.
 
-    Port ``v1`` accepts the guide point's velocity v_1 (3), m/s, in W.
-    Port ``guide`` accepts the guide signal (12).
-    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
-    Port ``v2`` emits the correction v_2 (3), m/s, in W.
+    Port ``v1`` accepts the guide point's `Velocity` v_1.
+    Port ``guide`` accepts the `Guide`.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool; O is the nearest.
+    Port ``v2`` emits the correction v_2, a `Velocity`.
     """
 
-    def __init__(self, params: VelocityCorrectionsParams | None = None) -> None:
+    def __init__(
+        self,
+        params: VelocityCorrectionsParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
+    ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
-        self._params = params or VelocityCorrectionsParams()
-        self._params.check()
-        self._constants = constants(self._params)
-        self._v1 = self.vector_in("v1", [0.05, 0.0, 0.0])
-        self._guide = self.vector_in("guide", GUIDE_EXAMPLE)
-        self._obstacle = self.vector_in("obstacle", OBSTACLE_EXAMPLE)
-        self.vector_out(
-            "v2",
-            3,
-            self._calc_v2,
+        self.declare_map(
+            _correct,
+            [constants(params or VelocityCorrectionsParams())],
             {
-                self._v1.ticket(),
-                self._guide.ticket(),
-                self._obstacle.ticket(),
+                "v1": Velocity,
+                "guide": Guide,
+                "obstacles": Many(Estimate, tuple(obstacles)),
             },
-        )
-
-    def _calc_v2(self, context: Any) -> np.ndarray:
-        return _v2(
-            self._constants,
-            self._v1.Eval(context),
-            self._guide.Eval(context),
-            self._obstacle.Eval(context),
+            "v2",
+            Velocity,
         )

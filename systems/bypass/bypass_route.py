@@ -12,23 +12,18 @@ follows, and retracting always opens it: a retract, turn, insert that cuts the c
 complete for any number of standing tools that leave the room q_min + D at G_R.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.bypass.shadow_body import (
-    FULCRUM,
-    PLAN,
-    SAFE,
-    TIP,
-    pose_distance,
-    way_distance,
-)
+from systems.bypass.shadow_body import pose_distance, read_tool, way_distance
 from systems.bypass.tip_edge import tip_edge
 from systems.bypass.top_edge import top_edge
 from systems.bypass.waiting_pose import waiting_pose
-from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, along, norm, sub, unit, xyz
+from systems.common.compiled import compiled
+from systems.common.geometry import along, norm, scaled, sub, unit
+from systems.common.signal import Vector
+from systems.common.signals import ViewCone
 
 STRAIGHT = 0
 OVER = -1
@@ -38,7 +33,18 @@ _SLACK = 1e-4
 """How much nearer to a tool than now a leg may lead where R is near already, m."""
 _HALVINGS = 12
 
-type Choice = tuple[Vector, float, int, int, Vector]
+
+class Choice(NamedTuple):
+    """The way of R's tip: its direction, length in m and number; where it goes to.
+
+    That is the target, or a pose to wait in: number `waits`, 0 if R does not wait.
+    """
+
+    direction: Vector
+    length: float
+    edge: int
+    waits: int
+    aim: Vector
 
 
 @compiled
@@ -52,7 +58,7 @@ def is_free(
 ) -> bool:
     """Whether the straight motion keeps its distances; the tool `but` is left out."""
     for i in range(len(tools)):
-        if i != but and way_distance(tools[i], g, p, goal) < keep[i]:
+        if i != but and way_distance(read_tool(tools[i]), g, p, goal) < keep[i]:
             return False
     return True
 
@@ -69,7 +75,7 @@ def up_and_over(
     """Direction of the tip and length of the way (m) where no edge will do.
 
     Args:
-        tools: Obstacle tools (n, 11).
+        tools: Rows of `ObstacleTool`.
         keep: Distances of the axes to keep (n), m.
         q_min: Least insertion, m.
         g: Fulcrum G_R, m.
@@ -81,9 +87,8 @@ def up_and_over(
     low, high = min(q_min, depth), depth
     if not is_free(tools, keep, -1, g, p, along(g, low, u)):
         inside = sub(p, g)
-        q = norm(inside)
-        back = unit(inside)
-        return (-back[0], -back[1], -back[2]), max(0.0, q - low) + depth - low
+        back = scaled(-1.0, unit(inside))
+        return back, max(0.0, norm(inside) - low) + depth - low
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if is_free(tools, keep, -1, g, p, along(g, middle, u)):
@@ -98,7 +103,7 @@ def up_and_over(
 def choose_way(
     params: Any,
     workspace: Any,
-    view_cone: Numbers,
+    view_cone: ViewCone,
     g: Vector,
     p: Vector,
     goal: Vector,
@@ -111,23 +116,20 @@ def choose_way(
     Args:
         params: A record of `tool_bypass.constants`.
         workspace: A record of `workspace.constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
         g: Fulcrum G_R, m.
         p: Tip of R, m.
         goal: The target, m.
-        tools: Obstacle tools (n, 11), see `shadow_body`.
+        tools: Rows of `ObstacleTool`.
         edge: The way in use: STRAIGHT, OVER, or an edge's number.
         waits: Number of the pose that R waits in, 0 if it does not wait.
-
-    Returns:
-        Unit direction of the tip, length of the way in m, the way's number, that of
-        the pose to wait in, and where it goes (the target, or a pose to wait in).
     """
     count = len(tools)
     room = params.freed_room if waits else params.blocked_room
     is_blocked = False
     for i in range(count):
-        if pose_distance(tools[i], g, goal) < tools[i, SAFE] + room:
+        tool = read_tool(tools[i])
+        if pose_distance(tool, g, goal) < tool.safe + room:
             is_blocked = True
     if is_blocked:
         goal, waits = waiting_pose(
@@ -137,43 +139,44 @@ def choose_way(
         waits = 0
     keep = np.empty(count)
     for i in range(count):
-        rho = pose_distance(tools[i], g, goal) - params.goal_slack
-        keep[i] = max(tools[i, SAFE] + params.goal_slack, min(tools[i, PLAN], rho))
+        tool = read_tool(tools[i])
+        rho = pose_distance(tool, g, goal) - params.goal_slack
+        keep[i] = max(tool.safe + params.goal_slack, min(tool.plan, rho))
     way = sub(goal, p)
     if is_free(tools, keep, -1, g, p, goal):
-        return unit(way), norm(way), STRAIGHT, waits, goal
+        return Choice(unit(way), norm(way), STRAIGHT, waits, goal)
     # Where R is nearer already, a leg is held to lead no nearer.
     legs = np.empty(count)
     for i in range(count):
-        legs[i] = min(keep[i], pose_distance(tools[i], g, p) - _SLACK)
+        legs[i] = min(keep[i], pose_distance(read_tool(tools[i]), g, p) - _SLACK)
     best, least, direction = OVER, 1e9, (0.0, 0.0, 0.0)
     kept, kept_direction = 1e9, direction
     for number in range(1, 2 * count + 1):
         i = (number - 1) // 2
-        if way_distance(tools[i], g, p, goal) >= keep[i]:
+        tool = read_tool(tools[i])
+        if way_distance(tool, g, p, goal) >= keep[i]:
             continue
-        a, p_o = xyz(tools[i], FULCRUM), xyz(tools[i], TIP)
+        a, p_o = tool.fulcrum, tool.tip
         if number % 2 == 1:
             route = top_edge(g, p, goal, a, p_o, keep[i], workspace, view_cone)
         else:
             route = tip_edge(g, p, goal, a, p_o, keep[i], workspace, view_cone)
-        is_there, length, toward, middle = route
-        if not is_there:
+        if not route.is_there:
             continue
         if count > 1 and not (
-            is_free(tools, legs, i, g, p, middle)
-            and is_free(tools, keep, i, g, middle, goal)
+            is_free(tools, legs, i, g, p, route.edge)
+            and is_free(tools, keep, i, g, route.edge, goal)
         ):
             continue
         if number == edge:
-            kept, kept_direction = length, toward
-        if length < least:
-            best, least, direction = number, length, toward
+            kept, kept_direction = route.length, route.direction
+        if route.length < least:
+            best, least, direction = number, route.length, route.direction
     if kept < 1e8 and least > params.switch_ratio * kept - params.switch_gain:
-        return kept_direction, kept, edge, waits, goal
+        return Choice(kept_direction, kept, edge, waits, goal)
     if best != OVER and (edge != OVER or count == 1):
-        return direction, least, best, waits, goal
+        return Choice(direction, least, best, waits, goal)
     over, length = up_and_over(tools, legs, workspace.min_insertion, g, p, goal)
     if least < params.switch_ratio * length - params.switch_gain:
-        return direction, least, best, waits, goal
-    return over, length, OVER, waits, goal
+        return Choice(direction, least, best, waits, goal)
+    return Choice(over, length, OVER, waits, goal)

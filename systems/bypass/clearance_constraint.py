@@ -25,21 +25,19 @@ Braking: the closing speed allowed falls as gamma (rho - D_safe), so the deceler
 asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_O).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from math import inf
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
-from systems.bypass.shadow_body import FULCRUM, SAFE, TIP, VELOCITY
+from systems.bypass.shadow_body import ObstacleTool, read_tool
 from systems.bypass.workspace import WorkspaceParams, borders
-from systems.common.compiled import Numbers, compiled, packed
+from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
-    Vector,
     all_finite,
     along,
     any_perpendicular,
@@ -48,19 +46,28 @@ from systems.common.geometry import (
     cross,
     dot,
     norm,
+    scaled,
+    set_row,
     shaft_point_velocity,
     sub,
     unit,
-    xyz,
 )
+from systems.common.parameter import Rules, check, parameter
 from systems.common.projection import greatest_rate, nearest_velocity
+from systems.common.reach_limits import ReachLimits
+from systems.common.signal import Field, Many, Vector
 from systems.common.signals import (
-    CAMERA_EXAMPLE,
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
-    VIEW_CONE_EXAMPLE,
+    FREE,
+    Estimate,
+    Guide,
+    Permission,
+    RobotTool,
+    Velocity,
+    ViewCone,
+    all_usable,
+    finite_cone,
+    finite_guide,
+    finite_tool,
     usable,
 )
 from systems.common.step_block import StepBlock
@@ -71,120 +78,120 @@ _OUTWARDS = 0.05
 """Share of insertion in A above which retracting would bring R nearer to the tool."""
 _MISSED = 1e-3
 """A row is missed by more than the solver's own error, m/s."""
-_ROWS = 14
-_FREE = np.array([1.0, 0.0])
-TOOLS = 3
-"""Most obstacle tools: O, S, endoscope."""
+
+
+class ClearanceStatus(NamedTuple):
+    """What the constraint sees and does."""
+
+    room: Annotated[float, Field("m", "the least rho - D_safe", 0.02)]
+    near: Annotated[float, Field("1", "1 while a tool is near, else 0", 0.0)]
+    condition: Annotated[
+        float, Field("1", "1 while evasion can keep it for all that are near", 1.0)
+    ]
+    dodge: Annotated[float, Field("1", "1 while R dodges, else 0", 0.0)]
+    change: Annotated[float, Field("m/s", "of the tip's velocity", 0.0)]
+    missed: Annotated[float, Field("m/s", "by how much a row is missed", 0.0)]
 
 
 @dataclass
 class ClearanceConstraintParams:
-    """Parameters of `ClearanceConstraint`.
+    """Parameters of `ClearanceConstraint`."""
 
-    Attributes:
-        active: If not, the velocity passes unchanged, and the status is still given.
-        period: Of the update, s.
-        max_speed: v_max that evasion may use, m/s.
-        turning_speed: omega_max of the shaft, rad/s.
-        rate: gamma, 1/s; at most a_max / (v_max + V_O).
-        obstacle_speed: V_O to be reckoned with, m/s: within D_safe + V_O / gamma a tool
-            counts as near.
-        dodge: Whether to dodge.
-    """
+    active: bool = parameter(
+        True, "if not, the velocity passes unchanged; the status is still given"
+    )
+    period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
+    max_speed: float = parameter(
+        0.1, "v_max that evasion may use", "m/s", above=0.0, most=0.5
+    )
+    turning_speed: float = parameter(
+        1.0, "omega_max of the shaft", "rad/s", above=0.0, most=10.0
+    )
+    rate: float = parameter(
+        4.0, "gamma; at most a_max / (v_max + V_O)", "1/s", least=0.1, most=60.0
+    )
+    obstacle_speed: float = parameter(
+        0.06,
+        "V_O to be reckoned with: within D_safe + V_O / gamma a tool counts as near",
+        "m/s",
+        least=0.01,
+        most=0.5,
+    )
+    dodge: bool = parameter(True, "whether to dodge")
 
-    active: bool = True
-    period: float = 1.0 / 60.0
-    max_speed: float = 0.1
-    turning_speed: float = 1.0
-    rate: float = 4.0
-    obstacle_speed: float = 0.06
-    dodge: bool = True
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        for name, value in vars(self).items():
-            if isinstance(value, float) and not 0.0 <= value < inf:
-                raise ValueError(
-                    f"clearance_constraint: {name}={value} must be finite and >= 0"
-                )
-        for name in ("period", "max_speed", "turning_speed", "rate"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(
-                    f"clearance_constraint: {name}={getattr(self, name)} must be > 0"
-                )
-        if self.rate * self.period > 0.5:
-            raise ValueError(
-                f"clearance_constraint: rate={self.rate} /s is too fast for "
-                f"period={self.period} s, expected at most {0.5 / self.period:.4g} /s"
-            )
+    def rules(self) -> Rules:
+        """What must hold across the parameters."""
+        fastest = 0.5 / self.period
+        yield self.rate <= fastest, "rate", f"at most 0.5 / period = {fastest:.4g} /s"
 
 
 def constants(params: ClearanceConstraintParams) -> np.ndarray:
     """The parameters as the compiled functions take them."""
-    params.check()
+    check(params)
     return packed(params)
 
 
+class DistanceRate(NamedTuple):
+    """How a distance of the axes changes: d rho/dt = A . v - c.
+
+    Attributes:
+        rho: The distance, m.
+        s: Proportion of R's inserted length at which it is.
+        A: What the velocity of R's tip does.
+        c: What the tool itself does, m/s.
+    """
+
+    rho: float
+    s: float
+    A: Vector
+    c: float
+
+
 @compiled
-def distance_rate(
-    g: Vector, p: Vector, tool: np.ndarray
-) -> tuple[float, float, Vector, float, bool]:
-    """How the distance of the axes to a tool changes: d rho/dt = A . v - c.
+def leverage(s: float, n: Vector, u: Vector) -> Vector:
+    """A for the proportion s of R along u; a fulcrum is no material point."""
+    if s <= 0.0:
+        return 0.0, 0.0, 0.0
+    return along(scaled(s, n), (1.0 - s) * dot(n, u), u)
+
+
+@compiled
+def distance_rate(g: Vector, p: Vector, tool: ObstacleTool) -> DistanceRate:
+    """How the distance to a tool changes for R from its fulcrum g to its tip p, m.
 
     A closest point at a fulcrum is no material point: there its tool does not count.
-
-    Args:
-        g: Fulcrum G_R, m.
-        p: Tip of R, m.
-        tool: A row of obstacle tools.
-
-    Returns:
-        rho in m, s, A, c in m/s, and whether the shafts are nearly parallel.
     """
-    a, p_o = xyz(tool, FULCRUM), xyz(tool, TIP)
-    s, fraction, rho, m_r, m_o = closest_points(g, p, a, p_o)
-    u, o = unit(sub(p, g)), unit(sub(p_o, a))
-    across = cross(u, o)
-    n = unit(sub(m_r, m_o), unit(across, any_perpendicular(u)))
-    row = (0.0, 0.0, 0.0)
-    if s > 0.0:
-        out = dot(n, u)
-        row = (
-            s * n[0] + (1.0 - s) * out * u[0],
-            s * n[1] + (1.0 - s) * out * u[1],
-            s * n[2] + (1.0 - s) * out * u[2],
-        )
+    near = closest_points(g, p, tool.fulcrum, tool.tip)
+    u, o = unit(sub(p, g)), unit(sub(tool.tip, tool.fulcrum))
+    n = unit(sub(near.p_A, near.p_B), unit(cross(u, o), any_perpendicular(u)))
     closing = 0.0
-    if fraction > 0.0:
-        closing = dot(n, shaft_point_velocity(fraction, o, xyz(tool, VELOCITY)))
-    return rho, s, row, closing, norm(across) < _PARALLEL
+    if near.t > 0.0:
+        closing = dot(n, shaft_point_velocity(near.t, o, tool.v))
+    return DistanceRate(near.distance, near.s, leverage(near.s, n, u), closing)
 
 
 @compiled
-def _ends(g: Vector, p: Vector, tool: np.ndarray) -> np.ndarray:
-    """Both tips' distances for nearly parallel shafts, (2, 5): A, c, rho."""
-    a, p_o = xyz(tool, FULCRUM), xyz(tool, TIP)
-    v_o = xyz(tool, VELOCITY)
+def are_parallel(g: Vector, p: Vector, tool: ObstacleTool) -> bool:
+    """Whether R and a tool are nearly parallel: the closest points jump there."""
+    u, o = unit(sub(p, g)), unit(sub(tool.tip, tool.fulcrum))
+    return norm(cross(u, o)) < _PARALLEL
+
+
+@compiled
+def tip_rates(
+    g: Vector, p: Vector, tool: ObstacleTool
+) -> tuple[DistanceRate, DistanceRate]:
+    """The same for R's tip and the tool's shaft, and for its tip and R's shaft."""
+    a, p_o = tool.fulcrum, tool.tip
     u, o = unit(sub(p, g)), unit(sub(p_o, a))
-    ends = np.zeros((2, 5))
-    # R's tip and O's shaft, O's tip and R's shaft.
-    fraction, rho = closest_on_segment(p, a, p_o)
-    n = unit(sub(p, along(a, fraction, sub(p_o, a))), any_perpendicular(u))
-    closing = dot(n, shaft_point_velocity(fraction, o, v_o)) if fraction > 0.0 else 0.0
-    ends[0, 0], ends[0, 1], ends[0, 2] = n[0], n[1], n[2]
-    ends[0, 3], ends[0, 4] = closing, rho
+    aside = any_perpendicular(u)
+    t, rho = closest_on_segment(p, a, p_o)
+    n = unit(sub(p, along(a, t, sub(p_o, a))), aside)
+    closing = dot(n, shaft_point_velocity(t, o, tool.v)) if t > 0.0 else 0.0
+    own = DistanceRate(rho, 1.0, n, closing)
     s, rho = closest_on_segment(p_o, g, p)
-    n = unit(sub(along(g, s, sub(p, g)), p_o), any_perpendicular(u))
-    out = dot(n, u)
-    if s > 0.0:
-        for i in range(3):
-            ends[1, i] = s * n[i] + (1.0 - s) * out * u[i]
-    ends[1, 3], ends[1, 4] = dot(n, v_o), rho
-    return ends
+    n = unit(sub(along(g, s, sub(p, g)), p_o), aside)
+    return own, DistanceRate(rho, s, leverage(s, n, u), dot(n, tool.v))
 
 
 @compiled
@@ -192,153 +199,143 @@ def must_dodge(
     params: Any,
     is_dodging: bool,
     q: float,
-    rho: float,
+    rate: DistanceRate,
     safe: float,
-    s: float,
     outwards: float,
-    closing: float,
     evasion: float,
 ) -> bool:
     """Whether R retracts from a tool that sweeps the inside of its shaft."""
-    if outwards > _OUTWARDS or closing <= (0.4 if is_dodging else 0.6) * evasion:
+    if outwards > _OUTWARDS or rate.c <= (0.4 if is_dodging else 0.6) * evasion:
         return False
-    left = max(0.0, rho - safe) / max(closing, 1e-6)
-    needed = (q - (s * q - safe)) / params.max_speed
+    left = max(0.0, rate.rho - safe) / max(rate.c, 1e-6)
+    needed = (q - (rate.s * q - safe)) / params.max_speed
     return left < 1.5 * needed + 0.3
+
+
+@compiled
+def least_rate(params: Any, rate: DistanceRate, safe: float, evasion: float) -> float:
+    """The bound of A . v, m/s: no more than can be done, as fast away as possible."""
+    return min(rate.c - params.rate * (rate.rho - safe), 0.9999 * evasion)
 
 
 @compiled
 def constrain(
     params: Any,
     workspace: Any,
-    view_cone: Numbers,
+    view_cone: ViewCone,
     g: Vector,
     p: Vector,
     wanted: Vector,
     tools: np.ndarray,
-    dodging: Numbers,
-) -> tuple[Vector, np.ndarray, np.ndarray]:
+    dodging: np.ndarray,
+) -> tuple[Vector, np.ndarray, ClearanceStatus]:
     """One step: the tip's velocity nearest to the wanted one that is safe.
 
     Args:
         params: A record of `constants`.
         workspace: A record of `workspace.constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
         g: Fulcrum G_R, m.
         p: Tip of R, m.
         wanted: The tip's wanted velocity, m/s.
-        tools: Obstacle tools (n, 11), n <= 3.
-        dodging: Whether R dodges each of them (3), 1 or 0.
+        tools: Rows of `ObstacleTool`.
+        dodging: Whether R dodges each of them, 1 or 0; as many or more.
 
     Returns:
-        The tip's velocity in m/s, whether R dodges each tool (3), and the status (6),
-        see `ClearanceConstraint`.
+        The tip's velocity in m/s, whether R dodges each tool, and the status.
     """
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft)
     turning = q * params.turning_speed
-    rows, bounds = np.zeros((_ROWS, 3)), np.full(_ROWS, -1e9)
-    dodges = np.zeros(TOOLS)
-    status = np.array([1e9, 0.0, 1.0, 0.0, 0.0, 0.0])
+    most = 3 * len(tools) + 5
+    rows, bounds = np.empty((most, 3)), np.empty(most)
+    dodges = np.zeros(len(dodging))
+    least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
     near = params.obstacle_speed / params.rate
     inwards, room = borders(workspace, view_cone, g, p)
     # A tip that is outside comes back no faster than it may go at all.
-    least = np.minimum(-params.rate * room, 0.25 * params.max_speed)
+    returning = np.minimum(-params.rate * room, 0.25 * params.max_speed)
     last = 0
     for i in range(len(tools)):
-        rho, s, row, closing, is_parallel = distance_rate(g, p, tools[i])
-        safe = tools[i, SAFE]
-        evasion = greatest_rate(row, u, params.max_speed, turning)
-        if rho - safe < near:
-            far = along((0.0, 0.0, 0.0), 100.0 * params.max_speed, row)
+        tool = read_tool(tools[i])
+        rate = distance_rate(g, p, tool)
+        evasion = greatest_rate(rate.A, u, params.max_speed, turning)
+        least = min(least, rate.rho - tool.safe)
+        if rate.rho - tool.safe < near:
+            far = scaled(100.0 * params.max_speed, rate.A)
             best, _ = nearest_velocity(
-                far, inwards, least, u, params.max_speed, turning
+                far, inwards, returning, u, params.max_speed, turning
             )
-            evasion = max(0.0, min(evasion, dot(row, best)))
-        if rho - safe < status[0]:
-            status[0] = rho - safe
-        if rho - safe < near:
-            status[1] = 1.0
-            if closing > evasion:
-                status[2] = 0.0
+            evasion = max(0.0, min(evasion, dot(rate.A, best)))
+            is_near = 1.0
+            if rate.c > evasion:
+                holds = 0.0
+        outwards = dot(rate.A, u)
         if params.dodge and must_dodge(
-            params, dodging[i] > 0.5, q, rho, safe, s, dot(row, u), closing, evasion
+            params, dodging[i] > 0.5, q, rate, tool.safe, outwards, evasion
         ):
-            dodges[i] = status[3] = 1.0
-        rows[last, 0], rows[last, 1], rows[last, 2] = row
-        # No more is asked for than can be done: as fast away as possible.
-        bounds[last] = min(closing - params.rate * (rho - safe), 0.9999 * evasion)
+            dodge = dodges[i] = 1.0
+        set_row(rows, last, rate.A)
+        bounds[last] = least_rate(params, rate, tool.safe, evasion)
         last += 1
-        if is_parallel:
-            ends = _ends(g, p, tools[i])
-            for k in range(2):
-                end = ends[k]
-                for axis in range(3):
-                    rows[last, axis] = end[axis]
-                evasion = greatest_rate(xyz(end, 0), u, params.max_speed, turning)
-                bound = end[3] - params.rate * (end[4] - safe)
-                bounds[last] = min(bound, 0.9999 * evasion)
+        if are_parallel(g, p, tool):
+            for end in tip_rates(g, p, tool):
+                evasion = greatest_rate(end.A, u, params.max_speed, turning)
+                set_row(rows, last, end.A)
+                bounds[last] = least_rate(params, end, tool.safe, evasion)
                 last += 1
-    if status[3] > 0.5:
-        wanted = (
-            -params.max_speed * u[0],
-            -params.max_speed * u[1],
-            -params.max_speed * u[2],
-        )
+    if dodge > 0.5:
+        wanted = scaled(-params.max_speed, u)
     if params.active:
-        for i in range(5):
-            for axis in range(3):
-                rows[last, axis] = inwards[i, axis]
-            bounds[last] = least[i]
-            last += 1
+        rows[last : last + 5], bounds[last : last + 5] = inwards, returning
+        last += 5
         v, missed = nearest_velocity(
             wanted, rows[:last], bounds[:last], u, params.max_speed, turning
         )
-        status[4] = norm(sub(v, wanted))
-        status[5] = missed
+        change = norm(sub(v, wanted))
         # Several tools may ask for what cannot be had together.
         if missed > _MISSED:
-            status[2] = 0.0
+            holds = 0.0
         wanted = v
+    status = ClearanceStatus(least, is_near, holds, dodge, change, missed)
     return wanted, dodges, status
 
 
 @compiled
 def _step(
-    record: np.ndarray,
-    margins: np.ndarray,
-    workspace: np.ndarray,
-    state: np.ndarray,
-    v_R: np.ndarray,
-    guide: np.ndarray,
-    robot_tool: np.ndarray,
-    obstacle: np.ndarray,
-    target: np.ndarray,
-    camera: np.ndarray,
-    view_cone: np.ndarray,
-    permission: np.ndarray,
-) -> np.ndarray:
-    """The next state (3), the guide point's velocity (3) and the status (6)."""
-    params = record[0]
-    v = xyz(v_R, 0)
-    known = usable(obstacle) and usable(target)
-    numbers = all_finite(v_R) and all_finite(guide) and all_finite(robot_tool)
-    if not (known and numbers and all_finite(view_cone)):
-        none = (0.0, 0.0, 0.0)
-        return np.array(none + v + (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    g, p, s = xyz(robot_tool, 0), xyz(robot_tool, 3), guide[7]
-    tools = obstacle_tools(margins[0], g, obstacle, target, camera)
-    share = max(0.0, min(1.0, permission[0])) / s
-    wanted = (v[0] * share, v[1] * share, v[2] * share)
+    params: Any,
+    margins: Any,
+    workspace: Any,
+    dodging: np.ndarray,
+    v_R: Velocity,
+    guide: Guide,
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+    camera: Estimate,
+    view_cone: ViewCone,
+    permission: Permission,
+) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
+    known = all_usable(obstacles) and usable(target)
+    numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
+    if not (known and numbers):
+        nothing = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return np.zeros(len(dodging)), Velocity(v), nothing
+    g, s = robot.fulcrum, guide.s
+    tools = obstacle_tools(margins, g, obstacles, target, camera)
+    share = max(0.0, min(1.0, permission.speed_scale)) / s
     v, dodges, status = constrain(
-        params, workspace[0], view_cone, g, p, wanted, tools, state
+        params,
+        workspace,
+        view_cone,
+        g,
+        robot.tip,
+        scaled(share, v),
+        tools,
+        dodging,
     )
-    result = np.empty(12)
-    result[0:3] = dodges
-    for i in range(3):
-        result[3 + i] = s * v[i]
-    result[6:] = status
-    return result
+    return dodges, Velocity(scaled(s, v)), status
 
 
 class ClearanceConstraint(StepBlock):
@@ -346,65 +343,66 @@ class ClearanceConstraint(StepBlock):
 
     After the fuzzy sum, before the tool's navigation; see the module. While an estimate
     is not usable or an input is not finite the velocity passes as it is: then the
-    arbiter slows R down and the navigation stops it.
+    arbiter slows R down and the navigation stops it. A wanted velocity that is not
+    finite counts as zero.
 
-    Port ``v_R`` accepts the wanted velocity of the guide point (3), m/s, in W.
-    Port ``guide`` accepts the guide signal (12), of which s is used.
-    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
-    (6), m, in W.
-    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
-    Port ``target`` accepts the estimate (17) of the target tool S.
-    Port ``camera`` accepts the estimate (17) of the endoscope.
-    Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
-    Port ``permission`` accepts the share of its speed that the passive wrist allows the
-    task, and a code that is not used (2); 1 if not connected. Evasion is not slowed.
-    Port ``v_safe`` emits the velocity of the guide point (3), m/s, in W.
-    Port ``status`` emits (6): the least rho - D_safe in m, 1 while a tool is near, 1
-    while the evasion condition holds for all that are near, 1 while R dodges, by how
-    much the tip's velocity was changed in m/s, and by how much a row is missed in m/s.
+    Port ``v_R`` accepts the wanted `Velocity` of the guide point.
+    Port ``guide`` accepts the `Guide`, of which s is used.
+    Port ``robot_tool`` accepts the `RobotTool`.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool.
+    Port ``target`` accepts the `Estimate` of the target tool S.
+    Port ``camera`` accepts the `Estimate` of the endoscope.
+    Port ``view_cone`` accepts the `ViewCone`.
+    Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
+    Evasion is not slowed.
+    Port ``v_safe`` emits the `Velocity` of the guide point.
+    Port ``status`` emits the `ClearanceStatus`.
 
-    The discrete state is whether R dodges each tool (3).
+    The discrete state is whether R dodges each tool: the obstacles, S, the endoscope.
     """
 
     def __init__(
         self,
         params: ClearanceConstraintParams | None = None,
         margins: Margins | None = None,
+        reach: ReachLimits | None = None,
         workspace: WorkspaceParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
     ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
             margins: Distances to the tools; the defaults if None.
-            workspace: Limits of R's tip; the defaults if None.
+            reach: What the navigation behind it keeps to; the defaults if None.
+            workspace: Further limits of R's tip; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
         params = params or ClearanceConstraintParams()
-        step = partial(
-            _step,
-            constants(params),
-            tools_around.constants(margins or Margins()),
-            limits.constants(workspace or WorkspaceParams()),
-        )
         self.declare_step(
-            step,
+            _step,
+            [
+                constants(params),
+                tools_around.constants(margins or Margins()),
+                limits.constants(reach, workspace),
+            ],
             {
-                "v_R": [0.05, 0.0, 0.0],
-                "guide": GUIDE_EXAMPLE,
-                "robot_tool": ROBOT_TOOL_EXAMPLE,
-                "obstacle": OBSTACLE_EXAMPLE,
-                "target": TARGET_EXAMPLE,
-                "camera": CAMERA_EXAMPLE,
-                "view_cone": VIEW_CONE_EXAMPLE,
-                "permission": _FREE.tolist(),
+                "v_R": Velocity,
+                "guide": Guide,
+                "robot_tool": RobotTool,
+                "obstacles": Many(Estimate, tuple(obstacles)),
+                "target": Estimate,
+                "camera": Estimate,
+                "view_cone": ViewCone,
+                "permission": Permission,
             },
-            [0.0] * TOOLS,
-            {"v_safe": 3, "status": 6},
+            np.zeros(len(obstacles) + 2),
+            {"v_safe": Velocity, "status": ClearanceStatus},
             params.period,
             timed=False,
-            defaults={"permission": _FREE},
+            defaults={"permission": FREE},
         )

@@ -1,4 +1,4 @@
-"""The tools that R must not touch: O, S's own shaft, the endoscope.
+"""The tools that R must not touch: the obstacles, S's own shaft, the endoscope.
 
 S is where R has to go, so its last part is left out: as much as the final pose itself
 comes nearer to than the distance that is planned with. What is left of S is an obstacle
@@ -6,31 +6,17 @@ like any other.
 """
 
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
-from systems.bypass.shadow_body import (
-    COLUMNS,
-    FULCRUM,
-    PLAN,
-    SAFE,
-    TIP,
-    VELOCITY,
-)
-from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import (
-    Vector,
-    along,
-    dot,
-    norm,
-    shaft_point_velocity,
-    sub,
-    unit,
-    xyz,
-)
-from systems.common.signals import fulcrum, usable, velocity
+from systems.bypass.shadow_body import ObstacleTool, write_tool
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import along, dot, norm, shaft_point_velocity, sub, unit
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Vector, size
+from systems.common.signals import Estimate, read_estimate, usable
 
 _LEAST_SINE = 0.15
 """Of the angle between S and R at the hand-over: no more of S is left out than this."""
@@ -38,63 +24,76 @@ _CLEAR = 0.001
 """Beyond the distance that is planned with, m."""
 
 
+COLUMNS = size(ObstacleTool)
+
+
 @dataclass
 class Margins:
     """How far R keeps from the tools: distances of the axes; instruments touch at 5 mm.
 
-    Attributes:
-        safe_distance: D_safe, that the clearance constraint holds, m.
-        plan_distance: D, that ways are planned with, m.
-        target_distance: D_safe of S's own shaft, m.
-        camera_distance: D_safe of the endoscope, which is twice as thick, m.
-        avoid_target: Whether S's shaft is an obstacle.
-        avoid_camera: Whether the endoscope is one.
-        sigmas: Standard deviations of an estimate that are added to the distances.
-        latency: From the tracker's exposure to the arm's motion, s; times sigma_v.
-        most_margin: No more than this is added for an estimate, m.
+    The distances grow with an estimate's uncertainty.
     """
 
-    safe_distance: float = 0.007
-    plan_distance: float = 0.0095
-    target_distance: float = 0.006
-    camera_distance: float = 0.0095
-    avoid_target: bool = True
-    avoid_camera: bool = True
-    sigmas: float = 3.0
-    latency: float = 0.03
-    most_margin: float = 0.004
+    safe_distance: float = parameter(
+        0.007,
+        "D_safe, that is held",
+        "m",
+        least=0.005,
+        most=0.03,
+    )
+    plan_distance: float = parameter(
+        0.0095, "D, that ways are planned with", "m", least=0.005, most=0.05
+    )
+    target_distance: float = parameter(
+        0.006, "D_safe of S's own shaft", "m", least=0.005, most=0.03
+    )
+    camera_distance: float = parameter(
+        0.0095,
+        "D_safe of the endoscope, which is twice as thick",
+        "m",
+        least=0.0075,
+        most=0.05,
+    )
+    avoid_target: bool = parameter(True, "whether S's shaft is an obstacle")
+    avoid_camera: bool = parameter(True, "whether the endoscope is one")
+    sigmas: float = parameter(
+        3.0,
+        "of an estimate's standard deviations that are added",
+        "1",
+        least=0.0,
+        most=10.0,
+    )
+    latency: float = parameter(
+        0.03,
+        "from the tracker's exposure to the arm's motion; times sigma_v",
+        "s",
+        least=0.0,
+        most=0.5,
+    )
+    most_margin: float = parameter(
+        0.004, "no more than this is added for an estimate", "m", least=0.0, most=0.02
+    )
 
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        for name, value in vars(self).items():
-            if not 0.0 <= value < inf:
-                raise ValueError(f"margins: {name}={value} must be finite and >= 0")
-        if not 0.0 < self.safe_distance < self.plan_distance:
-            raise ValueError(
-                f"margins: plan_distance={self.plan_distance} m must be over "
-                f"safe_distance={self.safe_distance} m, and both over 0"
-            )
+    def rules(self) -> Rules:
+        """What must hold across the margins."""
+        yield (
+            self.safe_distance < self.plan_distance,
+            "plan_distance",
+            f"more than safe_distance={self.safe_distance} m",
+        )
 
 
 def constants(margins: Margins) -> np.ndarray:
-    """The margins as the compiled functions take them.
-
-    Raises:
-        ValueError: If a margin is out of range.
-    """
-    margins.check()
+    """The margins as the compiled functions take them."""
+    check(margins)
     return packed(margins)
 
 
 @compiled
-def margin(margins: Any, estimate: Numbers) -> float:
+def margin(margins: Any, estimate: Estimate) -> float:
     """What the estimate's own uncertainty adds to the distances, m."""
-    late = margins.latency * estimate[13]
-    sigma = sqrt(estimate[12] * estimate[12] + late * late)
+    late = margins.latency * estimate.sigma_v
+    sigma = sqrt(estimate.sigma_p * estimate.sigma_p + late * late)
     return min(margins.most_margin, margins.sigmas * sigma)
 
 
@@ -116,15 +115,16 @@ def spared_length(g: Vector, p_WS: Vector, g_s: Vector, distance: float) -> floa
 
 
 @compiled
-def set_row(row: np.ndarray, margins: Any, estimate: Numbers) -> None:
-    """Writes an estimate (17) as a row (11) of obstacle tools, with its margin."""
+def tool_of(margins: Any, estimate: Estimate, thicker: float) -> ObstacleTool:
+    """An estimated tool, `thicker` than an instrument by this, m, with its margin."""
     extra = margin(margins, estimate)
-    for i in range(6):
-        row[i] = estimate[i]
-    for i in range(3):
-        row[FULCRUM + i] = estimate[9 + i]
-    row[SAFE] = margins.safe_distance + extra
-    row[PLAN] = margins.plan_distance + extra
+    return ObstacleTool(
+        estimate.p,
+        estimate.v,
+        estimate.fulcrum,
+        margins.safe_distance + extra + thicker,
+        margins.plan_distance + extra + thicker,
+    )
 
 
 @compiled
@@ -132,44 +132,53 @@ def tool_rows(margins: Any, estimates: np.ndarray) -> np.ndarray:
     """Obstacle tools (n, 11) of estimates (n, 17)."""
     rows = np.empty((len(estimates), COLUMNS))
     for i in range(len(estimates)):
-        set_row(rows[i], margins, estimates[i])
+        write_tool(rows, i, tool_of(margins, read_estimate(estimates[i]), 0.0))
     return rows
 
 
 @compiled
+def target_shaft(
+    margins: Any, g: Vector, target: Estimate
+) -> tuple[bool, ObstacleTool]:
+    """What is left of S as an obstacle for R under g, and whether anything is."""
+    tool = tool_of(margins, target, 0.0)
+    shaft = sub(target.p, target.fulcrum)
+    length, o = norm(shaft), unit(shaft)
+    distance = margins.plan_distance + _CLEAR
+    spared = spared_length(g, target.p, target.fulcrum, distance)
+    left = ObstacleTool(
+        along(target.p, -spared, o),
+        shaft_point_velocity(1.0 - spared / length, o, target.v),
+        target.fulcrum,
+        tool.safe + (margins.target_distance - margins.safe_distance),
+        tool.plan,
+    )
+    return spared < 0.95 * length, left
+
+
+@compiled
 def obstacle_tools(
-    margins: Any, g: Vector, obstacle: Numbers, target: Numbers, camera: Numbers
+    margins: Any, g: Vector, obstacles: np.ndarray, target: Estimate, camera: Estimate
 ) -> np.ndarray:
-    """The obstacle tools (n, 11), O first; see `shadow_body` for the columns.
+    """The tools to keep clear of (m, 11), the obstacles first; see `ObstacleTool`.
 
     Args:
         margins: A record of `constants`.
         g: Fulcrum G_R, m.
-        obstacle: Estimate (17) of O, usable.
-        target: Estimate (17) of S, usable.
-        camera: Estimate (17) of the endoscope.
+        obstacles: Estimates (n, 17), usable.
+        target: Of S, usable.
+        camera: Of the endoscope.
     """
-    rows = np.empty((3, COLUMNS))
-    set_row(rows[0], margins, obstacle)
-    count = 1
+    count = len(obstacles)
+    rows = np.empty((count + 2, COLUMNS))
+    rows[:count] = tool_rows(margins, obstacles)
     if margins.avoid_target:
-        g_s, p_s = fulcrum(target), xyz(target, 0)
-        shaft = sub(p_s, g_s)
-        length = norm(shaft)
-        spared = spared_length(g, p_s, g_s, margins.plan_distance + _CLEAR)
-        if spared < 0.95 * length:
-            row, o = rows[count], unit(shaft)
-            set_row(row, margins, target)
-            end = along(p_s, -spared, o)
-            v = shaft_point_velocity(1.0 - spared / length, o, velocity(target))
-            for i in range(3):
-                row[TIP + i], row[VELOCITY + i] = end[i], v[i]
-            row[SAFE] += margins.target_distance - margins.safe_distance
+        is_left, shaft = target_shaft(margins, g, target)
+        if is_left:
+            write_tool(rows, count, shaft)
             count += 1
     if margins.avoid_camera and usable(camera):
-        set_row(rows[count], margins, camera)
         thicker = margins.camera_distance - margins.safe_distance
-        rows[count, SAFE] += thicker
-        rows[count, PLAN] += thicker
+        write_tool(rows, count, tool_of(margins, camera, thicker))
         count += 1
     return rows[:count]

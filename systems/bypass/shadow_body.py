@@ -19,27 +19,40 @@ The straight motion of the tip from p to g sweeps the triangle G, p, g; see
 """
 
 from math import sqrt
+from typing import Annotated, NamedTuple
 
-import numpy as np
-
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import (
-    along,
+    across,
     closest_points,
     dot,
     norm,
     segment_triangle_distance,
     sub,
     unit,
-    xyz,
 )
+from systems.common.signal import Field, Vector, reader, row_writer
 
 FAR = 1.0
 """A depth beyond any tool's reach, m."""
 
 
+class ObstacleTool(NamedTuple):
+    """A tool that R must not touch; several are the rows of an array (n, 11)."""
+
+    tip: Annotated[Vector, Field("m", "p_WP", (0.0, 0.05, -0.1))]
+    v: Annotated[Vector, Field("m/s", "v_WP", (0.0, -0.03, 0.0))]
+    fulcrum: Annotated[Vector, Field("m", "p_WG", (0.0, 0.1, 0.0))]
+    safe: Annotated[float, Field("m", "distance of the axes that is held", 0.007)]
+    plan: Annotated[float, Field("m", "that ways are planned with", 0.0095)]
+
+
+read_tool = reader(ObstacleTool)
+write_tool = row_writer(ObstacleTool)
+
+
 @compiled
-def sphere_entry(g: Numbers, u: Numbers, center: Numbers, radius: float) -> float:
+def sphere_entry(g: Vector, u: Vector, center: Vector, radius: float) -> float:
     """Depth at which the ray from g along u enters a sphere, m; FAR if it does not."""
     m = sub(g, center)
     b = dot(m, u)
@@ -51,32 +64,27 @@ def sphere_entry(g: Numbers, u: Numbers, center: Numbers, radius: float) -> floa
 
 
 @compiled
-def free_depth(
-    g: Numbers, u: Numbers, a: Numbers, p: Numbers, distance: float
-) -> float:
-    """First depth at which the ray from g comes within `distance` of the segment ap.
+def free_depth(g: Vector, u: Vector, tool: ObstacleTool, distance: float) -> float:
+    """First depth at which the ray from g comes within `distance` of a tool's axis.
 
     Args:
         g: Fulcrum of R, m.
         u: Unit vector along R.
-        a: Fulcrum of the obstacle tool, m.
-        p: Its tip, m.
+        tool: The obstacle tool.
         distance: D, m.
 
     Returns:
         q_c, m: R is free at all depths below it. FAR where the ray never comes near.
     """
+    a, p = tool.fulcrum, tool.tip
     depth = min(sphere_entry(g, u, a, distance), sphere_entry(g, u, p, distance))
     d = sub(p, a)
-    length = norm(d)
-    o = unit(d)
+    length, o = norm(d), unit(d)
     # The cylinder between the two spheres: everything across O's axis.
     m = sub(g, a)
     mo, uo = dot(m, o), dot(u, o)
-    m = along(m, -mo, o)
-    across = along(u, -uo, o)
-    k = dot(across, across)
-    b = dot(m, across)
+    m, side = across(m, o), across(u, o)
+    k, b = dot(side, side), dot(m, side)
     c = dot(m, m) - distance * distance
     discriminant = b * b - k * c
     if k < 1e-12 or discriminant < 0.0:
@@ -89,29 +97,13 @@ def free_depth(
     return depth
 
 
-# A tool in an array of obstacle tools: what stands at which column.
-TIP = 0
-VELOCITY = 3
-FULCRUM = 6
-SAFE = 9
-PLAN = 10
-COLUMNS = 11
+@compiled
+def pose_distance(tool: ObstacleTool, g: Vector, p: Vector) -> float:
+    """Distance of the axes of R (g to p) and an obstacle tool, m."""
+    return closest_points(g, p, tool.fulcrum, tool.tip).distance
 
 
 @compiled
-def pose_distance(tool: np.ndarray, g: Numbers, p: Numbers) -> float:
-    """Distance of the axes of R (g to p) and an obstacle tool, m.
-
-    Args:
-        tool: A row (11) of obstacle tools: tip, its velocity, fulcrum, then the
-            distances of the axes that are held at least and planned with, m.
-        g: Fulcrum of R, m.
-        p: Tip of R, m.
-    """
-    return closest_points(g, p, xyz(tool, FULCRUM), xyz(tool, TIP))[2]
-
-
-@compiled
-def way_distance(tool: np.ndarray, g: Numbers, p: Numbers, goal: Numbers) -> float:
+def way_distance(tool: ObstacleTool, g: Vector, p: Vector, goal: Vector) -> float:
     """Least distance of the axes while R's tip goes straight from p to `goal`, m."""
-    return segment_triangle_distance(xyz(tool, FULCRUM), xyz(tool, TIP), g, p, goal)
+    return segment_triangle_distance(tool.fulcrum, tool.tip, g, p, goal)

@@ -16,17 +16,22 @@ from typing import Any
 
 from systems.bypass.top_edge import Route, no_route
 from systems.bypass.workspace import line_inside
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import (
-    Vector,
+    across,
     along,
     any_perpendicular,
     cross,
     dot,
     norm,
+    over,
+    plus,
+    scaled,
     sub,
     unit,
 )
+from systems.common.signal import Vector
+from systems.common.signals import ViewCone
 
 
 @compiled
@@ -52,7 +57,7 @@ def tip_edge(
     p_o: Vector,
     distance: float,
     workspace: Any,
-    view_cone: Numbers,
+    view_cone: ViewCone,
 ) -> Route:
     """The shortest way of R's tip from p to `goal` round O's tip.
 
@@ -64,7 +69,7 @@ def tip_edge(
         p_o: Tip of O, m.
         distance: D of the axes that the way keeps, m.
         workspace: A record of `workspace.constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
     """
     to_tip = sub(p_o, g)
     r = norm(to_tip)
@@ -72,9 +77,7 @@ def tip_edge(
         return no_route(p)
     c = unit(to_tip)
     alpha = asin(distance / r)
-    to_wall = sub(a, g)
-    to_wall = along(to_wall, -dot(to_wall, c), c)
-    away = unit((-to_wall[0], -to_wall[1], -to_wall[2]), any_perpendicular(c))
+    away = unit(scaled(-1.0, across(sub(a, g), c)), any_perpendicular(c))
     side = cross(c, away)
     m, k = sub(p, g), sub(goal, g)
     q_p, q_f = norm(m), norm(k)
@@ -92,9 +95,8 @@ def tip_edge(
     reach_f = arccos(cos(theta_f) / cos(alpha)) if theta_f > alpha else 0.0
     if arc > 0.0:
         path = reach_p + sin(alpha) * arc + reach_f
-        inwards = unit(along(c, -dot(c, u_p), u_p), away)
-        around = cross(c, u_p)
-        around = (around[0] / sine, around[1] / sine, around[2] / sine)
+        inwards = unit(across(c, u_p), away)
+        around = over(cross(c, u_p), sine)
         if theta_p >= alpha:
             sideways = min(1.0, sin(alpha) / sine)
             toward = sqrt(1.0 - sideways * sideways)
@@ -102,14 +104,10 @@ def tip_edge(
             out = min(1.0, 4.0 * (alpha - theta_p) / alpha)
             size = hypot(1.0, out)
             sideways, toward = 1.0 / size, -out / size
-        turning = along(
-            (toward * inwards[0], toward * inwards[1], toward * inwards[2]),
-            sigma * sideways,
-            around,
-        )
+        turning = along(scaled(toward, inwards), sigma * sideways, around)
     else:
         path = arccos(dot(u_p, u_f))
-        turning = unit(along(u_f, -dot(u_f, u_p), u_p))
+        turning = unit(across(u_f, u_p))
     total = fan(q_p, q_f, path)
     # The leg that the tip is on now: to the goal, or to a point at the edge.
     leg, q_leg, path_leg = total, q_f, path
@@ -117,8 +115,7 @@ def tip_edge(
     if psi_p * psi_f < 0.0:
         first = reach_p + sin(alpha) * (abs(psi_p) - beta_p)
         first = max(1e-6, min(path - 1e-6, first))
-        u_x = along((0.0, 0.0, 0.0), cos(alpha), c)
-        u_x = along(u_x, sin(alpha), away)
+        u_x = plus(scaled(cos(alpha), c), scaled(sin(alpha), away))
         straight = q_p * sin(first) + q_f * sin(path - first)
         q_x = 0.0
         if path < pi and straight > 0.0:
@@ -135,12 +132,8 @@ def tip_edge(
         edge = along(g, q_x, u_x)
     leg = max(leg, 1e-9)
     outwards = (q_leg * cos(path_leg) - q_p) / leg
-    across = q_leg * sin(path_leg) / leg
+    aside = q_leg * sin(path_leg) / leg
     if path_leg >= pi:
-        outwards, across = -1.0, 0.0
-    direction = (
-        outwards * u_p[0] + across * turning[0],
-        outwards * u_p[1] + across * turning[1],
-        outwards * u_p[2] + across * turning[2],
-    )
-    return True, total, unit(direction), edge
+        outwards, aside = -1.0, 0.0
+    direction = plus(scaled(outwards, u_p), scaled(aside, turning))
+    return Route(True, total, unit(direction), edge)

@@ -9,98 +9,132 @@ the goal. The tip's velocity is v = min(v_max, k Gamma) along the way, plus that
 moving target, and the guide point's v_1 = s v, as in the paper's form (`go_to_target`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from math import inf
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from systems.auto_guidance.go_to_target import guide_point
+from systems.auto_guidance.go_to_target import (
+    NOWHERE,
+    at_the_tip,
+    guide_point,
+    known_places,
+)
+from systems.auto_guidance.nearest import nearest_obstacle
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
 from systems.bypass.bypass_route import choose_way
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
 from systems.bypass.workspace import WorkspaceParams
-from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import Vector, all_finite, along, limited, sub, xyz
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import limited, plus, scaled, sub
+from systems.common.parameter import Rules, check, parameter
+from systems.common.reach_limits import ReachLimits
+from systems.common.signal import Field, Many, Vector
 from systems.common.signals import (
-    CAMERA_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
-    VIEW_CONE_EXAMPLE,
-    fulcrum,
+    Estimate,
+    Guide,
+    RobotTool,
+    Velocity,
+    ViewCone,
+    all_usable,
+    finite_cone,
+    finite_tool,
     usable,
-    velocity,
 )
 from systems.common.step_block import StepBlock
 
 
+class Way(NamedTuple):
+    """The way that R's tip goes."""
+
+    way: Annotated[
+        float,
+        Field(
+            "1",
+            "0 straight, -1 up and over, 1 and 2 the top and the tip edge of the "
+            "first obstacle, 3 and 4 of the second, then of S and of the endoscope",
+            0.0,
+        ),
+    ]
+    waiting: Annotated[float, Field("1", "pose that R waits in, 0 for none", 0.0)]
+    aim: Annotated[Vector, Field("m", "where it goes to", (0.05, 0.0, -0.1))]
+    switches: Annotated[float, Field("1", "times it changed from edge to edge", 0.0)]
+
+
+class State(NamedTuple):
+    """v_1 / s in m/s, the time of the last update in s, and what `Way` says."""
+
+    v_tip: Vector
+    time: float
+    way: float
+    waiting: float
+    switches: float
+
+
 @dataclass
 class ToolBypassParams:
-    """Parameters of `ToolBypass`.
+    """Parameters of `ToolBypass`."""
 
-    Attributes:
-        period: Of the update, s.
-        max_speed: v_max of the tip, m/s.
-        max_acceleration: Of the tip's commanded velocity, m/s^2.
-        approach_rate: k, 1/s: how the speed falls before the goal.
-        blocked_room: The goal counts as blocked below D_safe and this, m,
-        freed_room: and as free again above D_safe and this, m.
-        waiting_room: A pose to wait in is D_safe and this away, m.
-        goal_slack: A way is planned this much nearer than its own goal is, m.
-        switch_ratio: Another edge is taken if it is shorter than this part
-        switch_gain: of the one in use, and shorter by this as well, m.
-        proportion_floor: Least s, for shafts that are closest at G_R.
-    """
+    period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
+    max_speed: float = parameter(0.06, "v_max of the tip", "m/s", above=0.0, most=0.5)
+    max_acceleration: float = parameter(
+        1.0, "of the tip's commanded velocity", "m/s^2", above=0.0, most=10.0
+    )
+    approach_rate: float = parameter(
+        4.0, "k: how the speed falls before the goal", "1/s", above=0.0, most=50.0
+    )
+    blocked_room: float = parameter(
+        0.0003, "the goal is blocked below D_safe and this", "m", least=0.0, most=0.02
+    )
+    freed_room: float = parameter(
+        0.001, "and free again above D_safe and this", "m", least=0.0, most=0.02
+    )
+    waiting_room: float = parameter(
+        0.001, "a pose to wait in is D_safe and this away", "m", least=0.0, most=0.02
+    )
+    goal_slack: float = parameter(
+        0.0002,
+        "a way is planned this much nearer than its own goal is",
+        "m",
+        least=0.0,
+        most=0.002,
+    )
+    switch_ratio: float = parameter(
+        0.85,
+        "another edge is taken if shorter than this part",
+        above=0.0,
+        most=1.0,
+    )
+    switch_gain: float = parameter(
+        0.005,
+        "of the one in use, and by this as well",
+        "m",
+        least=0.0,
+        most=0.1,
+    )
+    proportion_floor: float = parameter(
+        0.1, "least s, for shafts that are closest at G_R", above=0.0, most=1.0
+    )
 
-    period: float = 1.0 / 60.0
-    max_speed: float = 0.06
-    max_acceleration: float = 1.0
-    approach_rate: float = 4.0
-    blocked_room: float = 0.0003
-    freed_room: float = 0.001
-    waiting_room: float = 0.001
-    goal_slack: float = 0.0002
-    switch_ratio: float = 0.85
-    switch_gain: float = 0.005
-    proportion_floor: float = 0.1
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        for name, value in vars(self).items():
-            if isinstance(value, float) and not 0.0 <= value < inf:
-                raise ValueError(f"tool_bypass: {name}={value} must be finite and >= 0")
-        for name in ("period", "max_speed", "max_acceleration", "approach_rate"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(
-                    f"tool_bypass: {name}={getattr(self, name)} must be > 0"
-                )
-        if not self.blocked_room < self.freed_room <= self.waiting_room:
-            raise ValueError(
-                f"tool_bypass: blocked_room={self.blocked_room} m, "
-                f"freed_room={self.freed_room} m and waiting_room="
-                f"{self.waiting_room} m must increase"
-            )
-        if not 0.0 < self.switch_ratio <= 1.0:
-            raise ValueError(
-                f"tool_bypass: switch_ratio={self.switch_ratio} must be in (0, 1]"
-            )
-        if not 0.0 < self.proportion_floor <= 1.0:
-            raise ValueError(
-                f"tool_bypass: proportion_floor={self.proportion_floor} must be in "
-                f"(0, 1]"
-            )
+    def rules(self) -> Rules:
+        """What must hold across the parameters."""
+        yield (
+            self.blocked_room < self.freed_room,
+            "freed_room",
+            f"more than blocked_room={self.blocked_room} m",
+        )
+        yield (
+            self.freed_room <= self.waiting_room,
+            "waiting_room",
+            f"at least freed_room={self.freed_room} m",
+        )
 
 
 def constants(params: ToolBypassParams) -> np.ndarray:
     """The parameters as the compiled functions take them."""
-    params.check()
+    check(params)
     return packed(params)
 
 
@@ -108,7 +142,7 @@ def constants(params: ToolBypassParams) -> np.ndarray:
 def bypass(
     params: Any,
     workspace: Any,
-    view_cone: Numbers,
+    view_cone: ViewCone,
     v_tip: Vector,
     dt: float,
     g: Vector,
@@ -124,14 +158,14 @@ def bypass(
     Args:
         params: A record of `constants`.
         workspace: A record of `workspace.constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
         v_tip: The tip's velocity before the step, m/s.
         dt: Length of the step, s.
         g: Fulcrum G_R, m.
         p: Tip of R, m.
         goal: The target, m.
         v_goal: Its velocity, m/s.
-        tools: Obstacle tools (n, 11).
+        tools: Rows of `ObstacleTool`.
         edge: The way in use.
         waits: Number of the pose that R waits in, 0 if it does not wait.
 
@@ -139,72 +173,61 @@ def bypass(
         The tip's velocity after the step in m/s, the way in use, the pose that R waits
         in, and where it goes to.
     """
-    direction, length, edge, waits, aim = choose_way(
-        params, workspace, view_cone, g, p, goal, tools, edge, waits
-    )
-    speed = min(params.max_speed, params.approach_rate * length)
-    wanted = along((0.0, 0.0, 0.0), speed, direction)
-    if waits == 0:
-        wanted = limited(along(wanted, 1.0, v_goal), params.max_speed)
+    way = choose_way(params, workspace, view_cone, g, p, goal, tools, edge, waits)
+    speed = min(params.max_speed, params.approach_rate * way.length)
+    wanted = scaled(speed, way.direction)
+    if way.waits == 0:
+        wanted = limited(plus(wanted, v_goal), params.max_speed)
     change = limited(sub(wanted, v_tip), params.max_acceleration * dt)
-    return along(v_tip, 1.0, change), edge, waits, aim
+    return plus(v_tip, change), way.edge, way.waits, way.aim
 
 
 @compiled
 def _step(
-    record: np.ndarray,
-    margins: np.ndarray,
-    workspace: np.ndarray,
-    state: np.ndarray,
+    params: Any,
+    margins: Any,
+    workspace: Any,
+    state: State,
     time: float,
-    robot_tool: np.ndarray,
-    obstacle: np.ndarray,
-    target: np.ndarray,
-    camera: np.ndarray,
-    view_cone: np.ndarray,
-) -> np.ndarray:
-    """The next state (7), v_1 (3), the guide signal (12) and the way (6)."""
-    params = record[0]
-    v_tip, dt = xyz(state, 0), time - state[3]
-    g, p, p_s = xyz(robot_tool, 0), xyz(robot_tool, 3), xyz(target, 0)
-    stop = limited((-v_tip[0], -v_tip[1], -v_tip[2]), params.max_acceleration * dt)
-    v_tip_stopping = along(v_tip, 1.0, stop)
-    edge, waits, aim = int(state[4]), int(state[5]), p
-    switches = state[6]
-    if not all_finite(robot_tool):
-        zero = (0.0, 0.0, 0.0)
-        guide: tuple[float, ...] = zero + zero + (0.0, 1.0, 1.0) + zero
-        v_tip, aim = v_tip_stopping, zero
-    elif not (all_finite(xyz(obstacle, 0) + fulcrum(obstacle)) and all_finite(p_s)):
-        guide = p + p + (0.0, 1.0, 1.0) + p
-        v_tip = v_tip_stopping
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+    camera: Estimate,
+    view_cone: ViewCone,
+) -> tuple[State, Velocity, Guide, Way]:
+    dt, g, p = time - state.time, robot.fulcrum, robot.tip
+    obstacle = nearest_obstacle(robot, obstacles)
+    stop = limited(scaled(-1.0, state.v_tip), params.max_acceleration * dt)
+    v_tip, aim = plus(state.v_tip, stop), p
+    edge, waits, switches = int(state.way), int(state.waiting), state.switches
+    if not finite_tool(robot):
+        guide, aim = at_the_tip(NOWHERE), NOWHERE
+    elif not known_places(obstacle, target):
+        guide = at_the_tip(p)
     else:
-        guide = guide_point(robot_tool, obstacle, p_s, params.proportion_floor)
-        if usable(obstacle) and usable(target) and all_finite(view_cone):
+        guide = guide_point(robot, obstacle, target.p, params.proportion_floor)
+        if all_usable(obstacles) and usable(target) and finite_cone(view_cone):
+            tools = obstacle_tools(margins, g, obstacles, target, camera)
             before = edge
-            tools = obstacle_tools(margins[0], g, obstacle, target, camera)
             v_tip, edge, waits, aim = bypass(
                 params,
-                workspace[0],
+                workspace,
                 view_cone,
-                v_tip,
+                state.v_tip,
                 dt,
                 g,
                 p,
-                p_s,
-                velocity(target),
+                target.p,
+                target.v,
                 tools,
                 edge,
                 waits,
             )
             if before > 0 and edge > 0 and edge != before:
                 switches += 1.0
-        else:
-            v_tip = v_tip_stopping
-    v1 = along((0.0, 0.0, 0.0), guide[7], v_tip)
-    memory = (time, float(edge), float(waits), switches)
-    way = (float(edge), float(waits)) + aim + (switches,)
-    return np.array(v_tip + memory + v1 + guide + way)
+    way = Way(float(edge), float(waits), aim, switches)
+    after = State(v_tip, time, way.way, way.waiting, switches)
+    return after, Velocity(scaled(guide.s, v_tip)), guide, way
 
 
 class ToolBypass(StepBlock):
@@ -212,58 +235,55 @@ class ToolBypass(StepBlock):
 
     A third form of the paper's "Go-to Target" (section 4.1); see the module.
 
-    Port ``robot_tool`` accepts the robot's instrument: fulcrum G_R and tip P_R
-    (6), m, in W.
-    Port ``obstacle`` accepts the estimate (17) of the obstacle tool O.
-    Port ``target`` accepts the estimate (17) of the target tool S.
-    Port ``camera`` accepts the estimate (17) of the endoscope.
-    Port ``view_cone`` accepts apex p_WC, axis, half angle (7).
-    Port ``v1`` emits the guide point's velocity v_1 (3), m/s, in W.
-    Port ``guide`` emits the guide signal (12): M_R, M_O, rho, s, l/L, M_R^f.
-    Port ``way`` emits the way in use (0 straight, -1 up and over, 1 and 2 the top and
-    the tip edge of O, then of S and of the endoscope), the number of the pose that R
-    waits in, 0 if it does not wait, where it goes to, m, in W, and how often it has
-    gone from one edge to another (6).
+    Port ``robot_tool`` accepts the `RobotTool`.
+    Port ``obstacles`` accepts the `Estimate` of every obstacle tool.
+    Port ``target`` accepts the `Estimate` of the target tool S.
+    Port ``camera`` accepts the `Estimate` of the endoscope.
+    Port ``view_cone`` accepts the `ViewCone`.
+    Port ``v1`` emits the guide point's `Velocity` v_1.
+    Port ``guide`` emits the `Guide`.
+    Port ``way`` emits the `Way`.
 
-    The discrete state is v_1 / s (3), the time of the last update, the way in use, the
-    pose that R waits in, and the changes of edge. The outputs are those of the step
-    from then to now.
+    The outputs are those of the step from the last update to now.
     """
 
     def __init__(
         self,
         params: ToolBypassParams | None = None,
         margins: Margins | None = None,
+        reach: ReachLimits | None = None,
         workspace: WorkspaceParams | None = None,
+        obstacles: Sequence[str] = ("obstacle",),
     ) -> None:
         """Builds the block.
 
         Args:
             params: Parameters; the defaults if None.
             margins: Distances to the tools; the defaults if None.
-            workspace: Limits of R's tip; the defaults if None.
+            reach: What the navigation behind it keeps to; the defaults if None.
+            workspace: Further limits of R's tip; the defaults if None.
+            obstacles: Names of the obstacle tools.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
         params = params or ToolBypassParams()
-        step = partial(
-            _step,
-            constants(params),
-            tools_around.constants(margins or Margins()),
-            limits.constants(workspace or WorkspaceParams()),
-        )
         self.declare_step(
-            step,
+            _step,
+            [
+                constants(params),
+                tools_around.constants(margins or Margins()),
+                limits.constants(reach, workspace),
+            ],
             {
-                "robot_tool": ROBOT_TOOL_EXAMPLE,
-                "obstacle": OBSTACLE_EXAMPLE,
-                "target": TARGET_EXAMPLE,
-                "camera": CAMERA_EXAMPLE,
-                "view_cone": VIEW_CONE_EXAMPLE,
+                "robot_tool": RobotTool,
+                "obstacles": Many(Estimate, tuple(obstacles)),
+                "target": Estimate,
+                "camera": Estimate,
+                "view_cone": ViewCone,
             },
-            [0.0, 0.0, 0.0, -params.period, 0.0, 0.0, 0.0],
-            {"v1": 3, "guide": 12, "way": 6},
+            State((0.0, 0.0, 0.0), -params.period, 0.0, 0.0, 0.0),
+            {"v1": Velocity, "guide": Guide, "way": Way},
             params.period,
         )

@@ -7,32 +7,43 @@ and inserting happen at once; no rule is needed for any of them.
 """
 
 from math import acos, atan2, cos, hypot, isfinite, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 from systems.bypass.workspace import line_inside
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import (
-    Vector,
+    across,
     along,
     any_perpendicular,
     cross,
     dot,
     norm,
+    over,
+    plus,
+    scaled,
     sub,
     unit,
 )
+from systems.common.signal import Vector
+from systems.common.signals import ViewCone
 
 LEAST_ARM = 0.01
 """The edge begins this far inside O's fulcrum: nearer there is wall, m."""
 
-type Route = tuple[bool, float, Vector, Vector]
-"""Whether there is a way, its length in m, the tip's direction, a point of the edge."""
+
+class Route(NamedTuple):
+    """A way over an edge: its length in m, the tip's direction, a point of the edge."""
+
+    is_there: bool
+    length: float
+    direction: Vector
+    edge: Vector
 
 
 @compiled
 def no_route(p: Vector) -> Route:
     """The answer where there is no way."""
-    return False, 1e9, (0.0, 0.0, 0.0), p
+    return Route(False, 1e9, (0.0, 0.0, 0.0), p)
 
 
 @compiled
@@ -66,7 +77,7 @@ def top_edge(
     p_o: Vector,
     distance: float,
     workspace: Any,
-    view_cone: Numbers,
+    view_cone: ViewCone,
 ) -> Route:
     """The shortest way of R's tip from p to `goal` over O's shaft.
 
@@ -78,14 +89,11 @@ def top_edge(
         p_o: Tip of O, m.
         distance: D of the axes that the way keeps, m.
         workspace: A record of `workspace.constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
     """
-    shaft = sub(p_o, a)
-    length = norm(shaft)
-    o = unit(shaft)
-    w = sub(g, a)
-    t_g = dot(w, o)
-    radial = along(w, -t_g, o)
+    shaft, w = sub(p_o, a), sub(g, a)
+    length, o = norm(shaft), unit(shaft)
+    t_g, radial = dot(w, o), across(w, o)
     d_g = norm(radial)
     e1 = unit(radial, any_perpendicular(o))
     e2 = cross(o, e1)
@@ -120,7 +128,7 @@ def top_edge(
     rise = t_f - t_p
     total = hypot(way, rise)
     slope = rise / way
-    edge = along(along(a, distance, e1), 0.0, o)
+    edge = along(a, distance, e1)
     if phi_p * phi_f < 0.0:
         # Where the way crosses the plane of G and O: on the tool, with room above it.
         first = reach_p + distance * (abs(phi_p) - beta_p)
@@ -140,10 +148,6 @@ def top_edge(
         edge = along(edge, t_edge, o)
     else:
         edge = goal
-    size = hypot(1.0, slope)
-    direction = (
-        (ex * e1[0] + ey * e2[0] + slope * o[0]) / size,
-        (ex * e1[1] + ey * e2[1] + slope * o[1]) / size,
-        (ex * e1[2] + ey * e2[2] + slope * o[2]) / size,
-    )
-    return True, total, direction, edge
+    round_o = plus(scaled(ex, e1), scaled(ey, e2))
+    direction = over(along(round_o, slope, o), hypot(1.0, slope))
+    return Route(True, total, direction, edge)

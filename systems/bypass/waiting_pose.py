@@ -12,26 +12,29 @@ from typing import Any
 import numpy as np
 
 from systems.bypass.shadow_body import (
-    FULCRUM,
-    SAFE,
-    TIP,
+    ObstacleTool,
     free_depth,
     pose_distance,
+    read_tool,
     way_distance,
 )
 from systems.bypass.workspace import is_inside
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import (
-    Vector,
+    across,
     along,
     any_perpendicular,
     cross,
-    dot,
     norm,
+    plus,
+    row_of,
+    scaled,
+    set_row,
     sub,
     unit,
-    xyz,
 )
+from systems.common.signal import Vector
+from systems.common.signals import ViewCone
 
 _NEARNESS = 0.3
 """What the distance from R counts, against that from the target."""
@@ -43,29 +46,32 @@ _HALVINGS = 16
 @compiled
 def turned(u: Vector, n: Vector, angle: float) -> Vector:
     """The unit vector u turned by `angle` towards the unit vector n across it."""
-    scaled = (cos(angle) * u[0], cos(angle) * u[1], cos(angle) * u[2])
-    return along(scaled, sin(angle), n)
+    return plus(scaled(cos(angle), u), scaled(sin(angle), n))
 
 
 @compiled
 def least_turn(
-    tool: np.ndarray, g: Vector, u: Vector, n: Vector, depth: float, distance: float
+    tool: ObstacleTool,
+    g: Vector,
+    u: Vector,
+    n: Vector,
+    depth: float,
+    distance: float,
 ) -> float:
     """The least angle from u towards n at which `depth` is free, up to 1.5 rad.
 
     Args:
-        tool: A row of obstacle tools.
+        tool: The obstacle tool.
         g: Fulcrum G_R, m.
         u: A direction in the tool's shadow, unit vector.
         n: Where to turn it to, a unit vector across u.
         depth: Insertion, m.
         distance: D of the axes to keep, m.
     """
-    a, p_o = xyz(tool, FULCRUM), xyz(tool, TIP)
     low, high = 0.0, 1.5
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if free_depth(g, turned(u, n, middle), a, p_o, distance) > depth:
+        if free_depth(g, turned(u, n, middle), tool, distance) > depth:
             high = middle
         else:
             low = middle
@@ -76,7 +82,7 @@ def least_turn(
 def waiting_pose(
     params: Any,
     workspace: Any,
-    view_cone: Numbers,
+    view_cone: ViewCone,
     g: Vector,
     p: Vector,
     goal: Vector,
@@ -88,11 +94,11 @@ def waiting_pose(
     Args:
         params: A record of `tool_bypass.constants`.
         workspace: A record of `workspace.constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
         g: Fulcrum G_R, m.
         p: Tip of R, m.
         goal: The target, in the shadow of a tool or several, m.
-        tools: Obstacle tools (n, 11).
+        tools: Rows of `ObstacleTool`.
         in_use: Number of the pose in use, 0 if none. It is kept until another is
             better by `switch_gain`, so that noise does not make R change its mind.
     """
@@ -103,38 +109,32 @@ def waiting_pose(
     # (i) In front of every tool.
     first = depth
     for i in range(count):
-        tool = tools[i]
-        keep = tool[SAFE] + params.waiting_room
-        a, p_o = xyz(tool, FULCRUM), xyz(tool, TIP)
-        first = min(first, free_depth(g, u, a, p_o, keep) - 1e-6)
-    pose = along(g, first, u)
-    for axis in range(3):
-        poses[0, axis] = pose[axis]
+        tool = read_tool(tools[i])
+        keep = tool.safe + params.waiting_room
+        first = min(first, free_depth(g, u, tool, keep) - 1e-6)
+    set_row(poses, 0, along(g, first, u))
     for i in range(count):
-        tool = tools[i]
-        keep = tool[SAFE] + params.waiting_room
+        tool = read_tool(tools[i])
+        keep = tool.safe + params.waiting_room
         if pose_distance(tool, g, goal) >= keep:
             continue
         # (ii) To either side of the slab through G, G_O and P_O, (iii) past the tip.
-        a, p_o = xyz(tool, FULCRUM), xyz(tool, TIP)
-        n = unit(cross(sub(a, g), sub(p_o, g)), any_perpendicular(u))
-        n = unit(along(n, -dot(n, u), u), any_perpendicular(u))
-        to_tip = sub(p_o, g)
-        beyond = unit(along(to_tip, -dot(to_tip, u), u), any_perpendicular(u))
+        to_tip = sub(tool.tip, g)
+        n = unit(cross(sub(tool.fulcrum, g), to_tip), any_perpendicular(u))
+        n = unit(across(n, u), any_perpendicular(u))
+        beyond = unit(across(to_tip, u), any_perpendicular(u))
         off = asin(min(1.0, norm(cross(to_tip, u)) / max(norm(to_tip), 1e-9)))
-        ways = (n, (-n[0], -n[1], -n[2]), beyond)
+        ways = (n, scaled(-1.0, n), beyond)
         for k in range(3):
             way, start = ways[k], u
             if k == 2:  # from O's tip on, where the free depths begin again
                 start = turned(u, way, off)
-                way = unit(along(way, -dot(way, start), start), n)
+                way = unit(across(way, start), n)
             angle = least_turn(tool, g, start, way, depth, keep)
-            pose = along(g, depth, turned(start, way, angle))
-            for axis in range(3):
-                poses[1 + 3 * i + k, axis] = pose[axis]
-    best, number, least = along(g, 1.0, sub(p, g)), len(poses) + 1, 1e9
+            set_row(poses, 1 + 3 * i + k, along(g, depth, turned(start, way, angle)))
+    best, number, least = plus(g, sub(p, g)), len(poses) + 1, 1e9
     for k in range(len(poses)):
-        pose = xyz(poses[k], 0)
+        pose = row_of(poses, k)
         if not isfinite(pose[0]) or not is_inside(workspace, view_cone, g, pose):
             continue
         is_kept = k + 1 == in_use
@@ -142,9 +142,10 @@ def waiting_pose(
         room = params.waiting_room
         slack = -room if is_kept else 0.8 * room
         for i in range(count):
-            if pose_distance(tools[i], g, pose) < tools[i, SAFE] + slack:
+            tool = read_tool(tools[i])
+            if pose_distance(tool, g, pose) < tool.safe + slack:
                 cost = 1e9
-            elif not is_kept and way_distance(tools[i], g, p, pose) < tools[i, SAFE]:
+            elif not is_kept and way_distance(tool, g, p, pose) < tool.safe:
                 cost += _DETOUR
         if is_kept and cost < 1e8:
             cost -= params.switch_gain

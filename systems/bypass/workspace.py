@@ -4,78 +4,79 @@ Each limit is a convex set, so that the part of a line inside them all is an int
 """
 
 from dataclasses import dataclass
-from math import cos, isfinite, pi, sqrt
+from math import cos, pi, sqrt
 from typing import Any
 
 import numpy as np
 
-from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import along, dot, norm, sub, unit, xyz
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import (
+    across,
+    dot,
+    norm,
+    over,
+    scaled,
+    sub,
+    unit,
+)
+from systems.common.parameter import check, parameter
+from systems.common.reach_limits import ReachLimits
+from systems.common.signal import Vector
+from systems.common.signals import ViewCone
 
 _DOWN = (0.0, 0.0, -1.0)
 
 
 @dataclass
 class WorkspaceParams:
-    """Limits of the tip, W, SI units; the wall is above, z up.
+    """What the planner knows beyond the `ReachLimits` of the navigation behind it."""
 
-    Attributes:
-        min_insertion: q_min, least length of shaft inside the patient, m.
-        max_insertion: Greatest length of shaft inside the patient, m.
-        max_tilt: Greatest angle of the shaft to the vertical, rad.
-        cone_margin: The tip stays this far inside the view cone's border, rad.
-        floor: Height of what must not be touched below, m.
-    """
-
-    min_insertion: float = 0.03
-    max_insertion: float = 0.2
-    max_tilt: float = 0.7
-    cone_margin: float = 0.02
-    floor: float = -0.2
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: With the name, the value and what was expected.
-        """
-        if not 0.0 < self.min_insertion < self.max_insertion:
-            raise ValueError(
-                f"workspace: min_insertion={self.min_insertion} m must be > 0 and less "
-                f"than max_insertion={self.max_insertion} m"
-            )
-        if not 0.0 < self.max_tilt <= pi:
-            raise ValueError(
-                f"workspace: max_tilt={self.max_tilt} rad must be in (0, pi]; is it in "
-                f"degrees?"
-            )
-        if not 0.0 <= self.cone_margin < 0.5 * pi:
-            raise ValueError(
-                f"workspace: cone_margin={self.cone_margin} rad must be in [0, pi/2)"
-            )
-        if not isfinite(self.floor):
-            raise ValueError(f"workspace: floor={self.floor} m must be finite")
+    floor: float = parameter(
+        -0.2, "height of what must not be touched below", "m", least=-0.5, most=0.0
+    )
 
 
-def constants(params: WorkspaceParams) -> np.ndarray:
-    """The parameters as the compiled functions take them."""
-    params.check()
-    return packed(params)
+def constants(
+    limits: ReachLimits | None = None, workspace: WorkspaceParams | None = None
+) -> np.ndarray:
+    """The limits of R's tip as the compiled functions take them; defaults if None."""
+    limits, workspace = limits or ReachLimits(), workspace or WorkspaceParams()
+    check(limits)
+    check(workspace)
+    return packed(
+        workspace,
+        min_insertion=limits.min_insertion,
+        max_insertion=limits.max_insertion,
+        max_tilt=limits.max_tilt,
+        cone_margin=limits.cone_margin,
+    )
 
 
 @compiled
-def line_in_cone(
-    x: Numbers, d: Numbers, apex: Numbers, axis: Numbers, half: float
-) -> tuple[float, float]:
+def tilt_cone(workspace: Any, g: Vector) -> ViewCone:
+    """The cone under the fulcrum g within the greatest tilt."""
+    return ViewCone(g, _DOWN, workspace.max_tilt)
+
+
+@compiled
+def narrowed(workspace: Any, view_cone: ViewCone) -> ViewCone:
+    """The view cone less its margin, where it does not hold everything anyway."""
+    is_whole = view_cone.half >= 0.5 * pi
+    half = pi if is_whole else view_cone.half - workspace.cone_margin
+    return ViewCone(view_cone.apex, view_cone.u, half)
+
+
+@compiled
+def line_in_cone(x: Vector, d: Vector, cone: ViewCone) -> tuple[float, float]:
     """The interval of t for which x + t d lies in a cone; (1, 0) if there is none.
 
     A cone of half angle pi/2 or more holds everything.
     """
-    if half >= 0.5 * pi:
+    if cone.half >= 0.5 * pi:
         return -1e9, 1e9
-    m = sub(x, apex)
-    c2 = cos(half) ** 2
-    ma, da = dot(m, axis), dot(d, axis)
+    m = sub(x, cone.apex)
+    c2 = cos(cone.half) ** 2
+    ma, da = dot(m, cone.u), dot(d, cone.u)
     k = da * da - c2 * dot(d, d)
     b = ma * da - c2 * dot(m, d)
     c = ma * ma - c2 * dot(m, m)
@@ -96,10 +97,10 @@ def line_in_cone(
 @compiled
 def line_inside(
     workspace: Any,
-    view_cone: Numbers,
-    g: Numbers,
-    x: Numbers,
-    d: Numbers,
+    view_cone: ViewCone,
+    g: Vector,
+    x: Vector,
+    d: Vector,
     low: float,
     high: float,
 ) -> tuple[float, float]:
@@ -109,7 +110,7 @@ def line_inside(
 
     Args:
         workspace: A record of `constants`.
-        view_cone: Apex, axis, half angle (7).
+        view_cone: What the endoscope sees.
         g: Fulcrum of R, m.
         x: A point of the line, m.
         d: Its direction, a unit vector.
@@ -119,12 +120,9 @@ def line_inside(
     Returns:
         (low, high), m; low > high if there is none.
     """
-    a, b = line_in_cone(x, d, g, _DOWN, workspace.max_tilt)
+    a, b = line_in_cone(x, d, tilt_cone(workspace, g))
     low, high = max(low, a), min(high, b)
-    half = view_cone[6] - workspace.cone_margin
-    if view_cone[6] >= 0.5 * pi:
-        half = pi
-    a, b = line_in_cone(x, d, xyz(view_cone, 0), xyz(view_cone, 3), half)
+    a, b = line_in_cone(x, d, narrowed(workspace, view_cone))
     low, high = max(low, a), min(high, b)
     m = sub(x, g)
     middle = -dot(m, d)
@@ -132,16 +130,16 @@ def line_inside(
     if reach < 0.0:
         return 1.0, 0.0
     low, high = max(low, middle - sqrt(reach)), min(high, middle + sqrt(reach))
-    over = x[2] - workspace.floor
+    height = x[2] - workspace.floor
     if abs(d[2]) < 1e-12:
-        return (low, high) if over >= 0.0 else (1.0, 0.0)
+        return (low, high) if height >= 0.0 else (1.0, 0.0)
     if d[2] > 0.0:
-        return max(low, -over / d[2]), high
-    return low, min(high, -over / d[2])
+        return max(low, -height / d[2]), high
+    return low, min(high, -height / d[2])
 
 
 @compiled
-def is_inside(workspace: Any, view_cone: Numbers, g: Numbers, p: Numbers) -> bool:
+def is_inside(workspace: Any, view_cone: ViewCone, g: Vector, p: Vector) -> bool:
     """Whether p is a place for R's tip, all limits included."""
     shaft = sub(p, g)
     if norm(shaft) < workspace.min_insertion:
@@ -151,39 +149,39 @@ def is_inside(workspace: Any, view_cone: Numbers, g: Numbers, p: Numbers) -> boo
 
 
 @compiled
+def cone_border(cone: ViewCone, p: Vector) -> tuple[Vector, float]:
+    """The inward normal of a cone's border and the room before it, m."""
+    ray = sub(p, cone.apex)
+    sideways = across(ray, cone.u)
+    off = norm(sideways)
+    if cone.half >= 0.5 * pi or off <= 1e-9:
+        return (0.0, 0.0, 0.0), 1e9
+    sine, cosine = sqrt(1.0 - cos(cone.half) ** 2), cos(cone.half)
+    normal = sub(scaled(sine, cone.u), over(scaled(cosine, sideways), off))
+    return normal, dot(ray, cone.u) * sine - off * cosine
+
+
+@compiled
 def borders(
-    workspace: Any, view_cone: Numbers, g: Numbers, p: Numbers
+    workspace: Any, view_cone: ViewCone, g: Vector, p: Vector
 ) -> tuple[np.ndarray, np.ndarray]:
     """The borders near the tip: inward normals (5, 3) and the room before each, m (5).
 
     Least and greatest insertion, tilt, view cone, floor. A border that does not exist
     has room without end.
     """
-    normals = np.zeros((5, 3))
-    room = np.full(5, 1e9)
     shaft = sub(p, g)
-    q = norm(shaft)
-    u = unit(shaft, _DOWN)
-    for i in range(3):
-        normals[0, i], normals[1, i] = u[i], -u[i]
-    room[0], room[1] = q - workspace.min_insertion, workspace.max_insertion - q
-    for row in range(2):
-        if row == 0:
-            apex, axis, half = g, _DOWN, workspace.max_tilt
-        else:
-            apex, axis = xyz(view_cone, 0), xyz(view_cone, 3)
-            half = view_cone[6] - workspace.cone_margin
-            if view_cone[6] >= 0.5 * pi:
-                half = pi
-        ray = sub(p, apex)
-        lengthwise = dot(ray, axis)
-        across = along(ray, -lengthwise, axis)
-        off = norm(across)
-        if half < 0.5 * pi and off > 1e-9:
-            sine, cosine = sqrt(1.0 - cos(half) ** 2), cos(half)
-            for i in range(3):
-                normals[2 + row, i] = sine * axis[i] - cosine * across[i] / off
-            room[2 + row] = lengthwise * sine - off * cosine
-    normals[4, 2] = 1.0
-    room[4] = p[2] - workspace.floor
+    q, u = norm(shaft), unit(shaft, _DOWN)
+    tilt, tilt_room = cone_border(tilt_cone(workspace, g), p)
+    view, view_room = cone_border(narrowed(workspace, view_cone), p)
+    normals = np.array((u, scaled(-1.0, u), tilt, view, scaled(-1.0, _DOWN)))
+    room = np.array(
+        (
+            q - workspace.min_insertion,
+            workspace.max_insertion - q,
+            tilt_room,
+            view_room,
+            p[2] - workspace.floor,
+        )
+    )
     return normals, room

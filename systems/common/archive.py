@@ -4,11 +4,15 @@ Each carries a digest of its content, so a damaged one is recognised, and the fi
 that it replaces is kept beside it.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+import errno
 import hashlib
 import io
 import json
 import os
 from pathlib import Path
+import stat
 from typing import Any
 
 import numpy as np
@@ -26,6 +30,44 @@ def beside(path: Path, what: str) -> Path:
     return path.with_name(f"{path.name}.{what}")
 
 
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Writes a file that is there whole or not at all.
+
+    Yields:
+        Where to write; at the end it takes the path's place, after an error it goes.
+    """
+    draft = beside(path, "draft")
+    try:
+        yield draft
+        with draft.open("rb") as stream:
+            os.fsync(stream.fileno())
+        os.replace(draft, path)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def read_regular(path: Path, most: int) -> bytes:
+    """What a regular file holds; nothing else is waited for, or read without end.
+
+    Raises:
+        OSError: If it cannot be read, is a folder, a pipe or a device, or is larger
+            than `most` bytes.
+    """
+
+    def at_once(name: str, flags: int) -> int:  # a pipe is waited for otherwise
+        return os.open(name, flags | os.O_NONBLOCK)
+
+    with open(path, "rb", opener=at_once) as stream:
+        about = os.fstat(stream.fileno())
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "no regular file")
+        if about.st_size > most:
+            reason = f"{about.st_size} bytes, expected at most {most}"
+            raise OSError(errno.EFBIG, reason)
+        return stream.read(most)
+
+
 def write_archive(path: Path, meta: dict[str, Any], arrays: dict[str, Any]) -> None:
     """Writes plain data and arrays; the file before is kept as `*.before`.
 
@@ -35,14 +77,10 @@ def write_archive(path: Path, meta: dict[str, Any], arrays: dict[str, Any]) -> N
     np.savez_compressed(buffer, meta=np.array(json.dumps(meta)), **arrays)
     content = buffer.getvalue()
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = beside(path, "draft")
-    with draft.open("wb") as stream:
-        stream.write(MAGIC + hashlib.sha256(content).digest() + content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    if path.exists():
-        os.replace(path, before(path))
-    os.replace(draft, path)
+    with whole(path) as draft:
+        draft.write_bytes(MAGIC + hashlib.sha256(content).digest() + content)
+        if path.exists():
+            os.replace(path, before(path))
 
 
 def read_archive(path: Path, what: str) -> tuple[dict[str, Any], dict[str, Any]]:

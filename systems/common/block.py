@@ -4,10 +4,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from pydrake.common import RandomDistribution
 from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
 from systems.common.compiled import Numbers
+from systems.common.signal import example, flat, size
 from systems.common.stopwatch import STOPWATCH
 
 
@@ -37,21 +39,65 @@ class Block(LeafSystem):
     """A digital controller.
 
     Physics is continuous and native to Drake; a block has its own period and
-    keeps its state in the context. Each vector input is declared with an
-    *example*: a physically sensible value that documents shape and units, and
-    that the contract test feeds to the block.
+    keeps its state in the context. Its ports are declared with the signals they carry
+    (`systems.common.signal`).
+
+    Attributes:
+        signals: Every vector port's signal, by the port's name.
     """
 
-    def vector_in(self, name: str, example: Sequence[float]) -> Any:
+    def __init__(self) -> None:
+        super().__init__()
+        self.signals: dict[str, Any] = {}
+
+    def signal_in(
+        self, name: str, signal: Any, drawn: RandomDistribution | None = None
+    ) -> Any:
+        """Declares an input port of a signal and returns it.
+
+        Args:
+            name: The port's name.
+            signal: What it accepts.
+            drawn: How its elements are drawn if it is noise.
+        """
+        self.signals[name] = signal
+        return self.vector_in(name, flat(example(signal)).tolist(), drawn)
+
+    def signal_out(
+        self,
+        name: str,
+        signal: Any,
+        calc: Callable[[Any], Numbers],
+        prerequisites: set[Any],
+    ) -> Any:
+        """Declares an output port of a signal computed by `calc(context)`.
+
+        Args:
+            name: The port's name.
+            signal: What it emits.
+            calc: Returns the elements for a context; an array is taken over several
+                times faster than a list.
+            prerequisites: Tickets of all that `calc` reads, so that the value
+                is cached and feedthrough is known.
+        """
+        self.signals[name] = signal
+        return self.vector_out(name, size(signal), calc, prerequisites)
+
+    def vector_in(
+        self,
+        name: str,
+        example: Sequence[float],
+        drawn: RandomDistribution | None = None,
+    ) -> Any:
         """Declares a vector input port and returns it.
 
         Args:
             name: The port's name.
             example: A sensible value; its length is the port's size.
+            drawn: How its elements are drawn if it is noise.
         """
-        return VectorInput(
-            self.DeclareVectorInputPort(name, BasicVector(np.asarray(example, float)))
-        )
+        model = BasicVector(np.asarray(example, float))
+        return VectorInput(self.DeclareVectorInputPort(name, model, drawn))
 
     def vector_out(
         self,
@@ -79,18 +125,20 @@ class Block(LeafSystem):
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
 
-    def state_out(self, name: str, initial: Sequence[float] | np.ndarray) -> Any:
+    def state_out(self, name: str, signal: Any, initial: np.ndarray) -> Any:
         """Declares a group of discrete state that is an output port as well.
 
         Cheaper than a computed output, and never feedthrough.
 
         Args:
             name: The port's name.
-            initial: The state's initial value; its length is the port's size.
+            signal: What it emits.
+            initial: The state's initial value.
 
         Returns:
             The group's index.
         """
+        self.signals[name] = signal
         group = self.DeclareDiscreteState(np.array(initial, float))
         self.DeclareStateOutputPort(name, group)
         return group

@@ -12,7 +12,7 @@ its first call for the types it gets and cached on disk.
 
 import ast
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from functools import cache
 import hashlib
 from importlib.util import find_spec
@@ -48,6 +48,21 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     return result
 
 
+def generated(source: str, name: str, home: Any, names: dict[str, Any]) -> Any:
+    """Compiles a function from its source text.
+
+    Args:
+        source: Of one function.
+        name: Its name.
+        home: A function or class of the file that it counts as part of.
+        names: What the source refers to.
+    """
+    scope = {**names, "__name__": home.__module__}
+    file = inspect.getfile(getattr(home, "py_func", home))
+    exec(compile(source, file, "exec"), scope)
+    return compiled(scope[name])
+
+
 class _Announcer(Listener):
     """Says once that something is being compiled."""
 
@@ -73,6 +88,16 @@ def announced() -> AbstractContextManager[Any]:
 
 _FOREIGN = sys.stdlib_module_names | {"numba", "numpy"}
 """Packages that are not looked into."""
+
+
+def rehearse(act: Callable[[], Any]) -> None:
+    """Acts once and forgets it, before a clock runs.
+
+    Kernels are compiled at their first call, or loaded from the disk: that is no part
+    of the time that the act takes. An error will come again in the act itself.
+    """
+    with announced(), suppress(Exception, SystemExit):
+        act()
 
 
 @cache

@@ -5,10 +5,12 @@ as tuples. Lengths in meters.
 """
 
 from math import isfinite, sqrt
+from typing import NamedTuple
+
+import numpy as np
 
 from systems.common.compiled import Numbers, compiled
-
-type Vector = tuple[float, float, float]
+from systems.common.signal import Vector
 
 # Below this share of |d1|^2 |d2|^2 two directions count as parallel
 # (sin^2 of their angle; 1e-12 is an angle of 1e-6 rad).
@@ -29,6 +31,18 @@ def all_finite(values: Numbers) -> bool:
 def xyz(values: Numbers, start: int) -> Vector:
     """The three elements of a signal from `start` on."""
     return values[start], values[start + 1], values[start + 2]
+
+
+@compiled
+def row_of(rows: np.ndarray, i: int) -> Vector:
+    """The i-th row of an array (n, 3)."""
+    return rows[i, 0], rows[i, 1], rows[i, 2]
+
+
+@compiled
+def set_row(rows: np.ndarray, i: int, v: Vector) -> None:
+    """Writes the i-th row of an array (n, 3)."""
+    rows[i, 0], rows[i, 1], rows[i, 2] = v
 
 
 @compiled
@@ -54,32 +68,53 @@ def sub(a: Numbers, b: Numbers) -> Vector:
 
 
 @compiled
+def plus(a: Numbers, b: Numbers) -> Vector:
+    """The sum a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compiled
+def scaled(t: float, a: Numbers) -> Vector:
+    """The product t a."""
+    return t * a[0], t * a[1], t * a[2]
+
+
+@compiled
+def over(a: Numbers, t: float) -> Vector:
+    """The quotient a / t."""
+    return a[0] / t, a[1] / t, a[2] / t
+
+
+@compiled
 def along(p: Numbers, t: float, d: Numbers) -> Vector:
     """The point p + t d."""
     return p[0] + t * d[0], p[1] + t * d[1], p[2] + t * d[2]
 
 
 @compiled
+def across(a: Numbers, u: Numbers) -> Vector:
+    """The part of a that is perpendicular to the unit vector u."""
+    return along(a, -dot(a, u), u)
+
+
+@compiled
 def norm(a: Numbers) -> float:
     """The Euclidean length."""
-    return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    return sqrt(dot(a, a))
 
 
 @compiled
 def unit(a: Numbers, otherwise: Vector = (0.0, 0.0, 0.0)) -> Vector:
     """The direction of `a`, or `otherwise` where `a` has none (zero length)."""
-    length = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    if length < 1e-12:
-        return otherwise
-    return a[0] / length, a[1] / length, a[2] / length
+    length = norm(a)
+    return otherwise if length < 1e-12 else over(a, length)
 
 
 @compiled
 def limited(a: Numbers, limit: float) -> Vector:
     """`a`, shortened to the length `limit` where it is longer."""
-    length = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    scale = 1.0 if length <= limit else limit / length
-    return a[0] * scale, a[1] * scale, a[2] * scale
+    length = norm(a)
+    return scaled(1.0 if length <= limit else limit / length, a)
 
 
 @compiled
@@ -97,6 +132,12 @@ def any_perpendicular(a: Numbers) -> Vector:
 
 
 @compiled
+def clamped(t: float) -> float:
+    """The number nearest to t in [0, 1]."""
+    return 0.0 if t < 0.0 else 1.0 if t > 1.0 else t
+
+
+@compiled
 def closest_on_segment(p: Numbers, a: Numbers, b: Numbers) -> tuple[float, float]:
     """The point of segment a->b nearest to p.
 
@@ -106,15 +147,22 @@ def closest_on_segment(p: Numbers, a: Numbers, b: Numbers) -> tuple[float, float
     """
     d = sub(b, a)
     length2 = dot(d, d)
-    t = dot(sub(p, a), d) / length2 if length2 > 0.0 else 0.0
-    t = 0.0 if t < 0.0 else 1.0 if t > 1.0 else t
+    t = clamped(dot(sub(p, a), d) / length2) if length2 > 0.0 else 0.0
     return t, norm(sub(along(a, t, d), p))
 
 
+class ClosestPoints(NamedTuple):
+    """Where two segments are closest: shares of their lengths, distance, points."""
+
+    s: float
+    t: float
+    distance: float
+    p_A: Vector
+    p_B: Vector
+
+
 @compiled
-def closest_points(
-    a0: Numbers, a1: Numbers, b0: Numbers, b1: Numbers
-) -> tuple[float, float, float, Vector, Vector]:
+def closest_points(a0: Numbers, a1: Numbers, b0: Numbers, b1: Numbers) -> ClosestPoints:
     """The closest points of the segments a0->a1 and b0->b1.
 
     Crossing segments give distance 0. Where the closest pair is not unique
@@ -123,36 +171,23 @@ def closest_points(
     count as points.
 
     Returns:
-        (s, t, distance, p_A, p_B): p_A = a0 + s (a1 - a0) and
-        p_B = b0 + t (b1 - b0) with s, t in [0, 1].
+        p_A = a0 + s (a1 - a0) and p_B = b0 + t (b1 - b0) with s, t in [0, 1].
     """
-    ux, uy, uz = a1[0] - a0[0], a1[1] - a0[1], a1[2] - a0[2]
-    vx, vy, vz = b1[0] - b0[0], b1[1] - b0[1], b1[2] - b0[2]
-    wx, wy, wz = a0[0] - b0[0], a0[1] - b0[1], a0[2] - b0[2]
-    a = ux * ux + uy * uy + uz * uz
-    b = ux * vx + uy * vy + uz * vz
-    c = vx * vx + vy * vy + vz * vz
-    d = ux * wx + uy * wy + uz * wz
-    e = vx * wx + vy * wy + vz * wz
+    u, v, w = sub(a1, a0), sub(b1, b0), sub(a0, b0)
+    a, b, c, d, e = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     if a * c <= 0.0 or a * c - b * b < _PARALLEL * a * c:
         s, t = _closest_of_ends(a0, a1, b0, b1)
     else:
         # Ericson, Real-Time Collision Detection, 5.1.9: clamp s on the
         # infinite second line, then t, then s again for the clamped t.
-        s = (b * e - c * d) / (a * c - b * b)
-        s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
+        s = clamped((b * e - c * d) / (a * c - b * b))
         t = (b * s + e) / c
         if t < 0.0:
-            t = 0.0
-            s = -d / a
-            s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
+            s, t = clamped(-d / a), 0.0
         elif t > 1.0:
-            t = 1.0
-            s = (b - d) / a
-            s = 0.0 if s < 0.0 else 1.0 if s > 1.0 else s
-    p = (a0[0] + s * ux, a0[1] + s * uy, a0[2] + s * uz)
-    q = (b0[0] + t * vx, b0[1] + t * vy, b0[2] + t * vz)
-    return s, t, norm(sub(p, q)), p, q
+            s, t = clamped((b - d) / a), 1.0
+    p, q = along(a0, s, u), along(b0, t, v)
+    return ClosestPoints(s, t, norm(sub(p, q)), p, q)
 
 
 @compiled
@@ -210,9 +245,9 @@ def segment_triangle_distance(
     n = cross(sub(b, a), sub(c, a))
     area2 = dot(n, n)
     least = min(
-        closest_points(p0, p1, a, b)[2],
-        closest_points(p0, p1, b, c)[2],
-        closest_points(p0, p1, c, a)[2],
+        closest_points(p0, p1, a, b).distance,
+        closest_points(p0, p1, b, c).distance,
+        closest_points(p0, p1, c, a).distance,
     )
     if area2 <= 1e-24:
         return least
@@ -244,8 +279,4 @@ def shaft_point_velocity(fraction: float, u: Numbers, v_tip: Numbers) -> Vector:
         v_tip: Velocity of the tip, m/s.
     """
     slide = (1.0 - fraction) * dot(u, v_tip)
-    return (
-        fraction * v_tip[0] + slide * u[0],
-        fraction * v_tip[1] + slide * u[1],
-        fraction * v_tip[2] + slide * u[2],
-    )
+    return along(scaled(fraction, v_tip), slide, u)

@@ -10,8 +10,20 @@ from math import sqrt
 
 import numpy as np
 
-from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, along, dot, limited, norm, sub
+from systems.common.compiled import compiled
+from systems.common.geometry import (
+    across,
+    along,
+    dot,
+    limited,
+    norm,
+    plus,
+    row_of,
+    scaled,
+    set_row,
+    sub,
+)
+from systems.common.signal import Vector
 
 TOLERANCE = 1e-7
 """Of a velocity, m/s."""
@@ -21,14 +33,14 @@ _LITTLE = 1e-4
 
 
 @compiled
-def onto_limits(v: Vector, u: Numbers, speed: float, turning: float) -> Vector:
+def onto_limits(v: Vector, u: Vector, speed: float, turning: float) -> Vector:
     """The nearest velocity of at most `speed`, and of at most `turning` across u.
 
     Exact: in the half plane of u and v it is the nearest point of a disc cut by a line.
     """
     lengthwise = dot(v, u)
-    across = along(v, -lengthwise, u)
-    side = norm(across)
+    sideways = across(v, u)
+    side = norm(sideways)
     if side <= turning and lengthwise * lengthwise + side * side <= speed * speed:
         return v
     most = min(turning, speed)
@@ -39,21 +51,16 @@ def onto_limits(v: Vector, u: Numbers, speed: float, turning: float) -> Vector:
     corner = sqrt(max(0.0, speed * speed - most * most))
     kept = max(-corner, min(corner, lengthwise))
     if side < 1e-12:
-        return kept * u[0], kept * u[1], kept * u[2]
-    scale = most / side
-    return (
-        scale * across[0] + kept * u[0],
-        scale * across[1] + kept * u[1],
-        scale * across[2] + kept * u[2],
-    )
+        return scaled(kept, u)
+    return along(scaled(most / side, sideways), kept, u)
 
 
 @compiled
-def most_missed(v: Numbers, rows: np.ndarray, bounds: np.ndarray) -> float:
+def most_missed(v: Vector, rows: np.ndarray, bounds: np.ndarray) -> float:
     """By how much v misses the row it misses most, m/s; 0 if none."""
     missed = 0.0
     for i in range(len(bounds)):
-        missed = max(missed, bounds[i] - dot(rows[i], v))
+        missed = max(missed, bounds[i] - dot(row_of(rows, i), v))
     return missed
 
 
@@ -62,7 +69,7 @@ def nearest_velocity(
     wanted: Vector,
     rows: np.ndarray,
     bounds: np.ndarray,
-    u: Numbers,
+    u: Vector,
     speed: float,
     turning: float,
 ) -> tuple[Vector, float]:
@@ -84,7 +91,7 @@ def nearest_velocity(
     corrections = np.zeros((count, 3))
     squares = np.empty(count)
     for i in range(count):
-        squares[i] = rows[i, 0] ** 2 + rows[i, 1] ** 2 + rows[i, 2] ** 2
+        squares[i] = dot(row_of(rows, i), row_of(rows, i))
     last = (0.0, 0.0, 0.0)
     v = wanted
     for _ in range(MOST_ROUNDS):
@@ -93,17 +100,13 @@ def nearest_velocity(
         for i in range(count):
             if squares[i] < 1e-12:
                 continue
-            x = v[0] + corrections[i, 0]
-            y = v[1] + corrections[i, 1]
-            z = v[2] + corrections[i, 2]
-            short = bounds[i] - (rows[i, 0] * x + rows[i, 1] * y + rows[i, 2] * z)
-            step = max(0.0, short) / squares[i]
-            v = (x + step * rows[i, 0], y + step * rows[i, 1], z + step * rows[i, 2])
-            corrections[i, 0], corrections[i, 1] = x - v[0], y - v[1]
-            corrections[i, 2] = z - v[2]
+            row, shifted = row_of(rows, i), plus(v, row_of(corrections, i))
+            short = bounds[i] - dot(row, shifted)
+            v = along(shifted, max(0.0, short) / squares[i], row)
+            set_row(corrections, i, sub(shifted, v))
             if short > 0.0:
-                between, active = along(between, 1.0, v), active + 1
-        shifted = along(v, 1.0, last)
+                between, active = plus(between, v), active + 1
+        shifted = plus(v, last)
         v = onto_limits(shifted, u, speed, turning)
         last = sub(shifted, v)
         missed = most_missed(v, rows, bounds)
@@ -112,17 +115,14 @@ def nearest_velocity(
     if missed < _LITTLE or active < 2:
         return v, missed
     # Rows against each other: as much of one as of the other is given up.
-    share = 1.0 / active
-    middle = (share * between[0], share * between[1], share * between[2])
-    v = onto_limits(middle, u, speed, turning)
+    v = onto_limits(scaled(1.0 / active, between), u, speed, turning)
     return v, most_missed(v, rows, bounds)
 
 
 @compiled
-def greatest_rate(row: Numbers, u: Numbers, speed: float, turning: float) -> float:
+def greatest_rate(row: Vector, u: Vector, speed: float, turning: float) -> float:
     """The greatest row . v within the speeds, m/s."""
-    lengthwise = dot(row, u)
-    side = norm(along(row, -lengthwise, u))
+    lengthwise, side = dot(row, u), norm(across(row, u))
     size = sqrt(lengthwise * lengthwise + side * side)
     most = min(turning, speed)
     if side * speed <= most * size:

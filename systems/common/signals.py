@@ -1,76 +1,172 @@
-"""What stands where in the signals that the auto-guidance blocks exchange.
+"""The signals that the arm's blocks, the tools and the wall exchange.
 
-`robot_tool` (6): fulcrum p_WG, tip p_WP of the robot's instrument.
-`estimate` (17) of a surgeon's tool: tip p_WP, v_WP, a_WP, fulcrum p_WG,
-sigma_p, sigma_v, sigma_a, known (1 or 0), age of the last valid frame.
-`guide` (12): p_WMR, p_WMO, rho, s, l/L, p_WMRf.
-World frame, SI units.
+Those of one room alone are declared beside their block. World frame W, SI units.
 """
 
-from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, all_finite, xyz
+from typing import Annotated, NamedTuple
 
-ROBOT_TOOL_EXAMPLE = [0.0, 0.0, 0.0, 0.02, 0.0, -0.12]
-"""A robot's instrument, 0.12 m inside."""
+import numpy as np
 
-TARGET_EXAMPLE = [
-    *(-0.05, 0.0, -0.12),
-    *(0.005, 0.0, 0.0),
-    *(0.0, 0.0, 0.0),
-    *(-0.12, 0.0, 0.0),
-    *(0.0003, 0.003, 0.05, 1.0, 0.0),
-]
-"""An estimate of the target tool S, drifting at 5 mm/s."""
+from systems.common.compiled import compiled
+from systems.common.signal import AXES, Field, Vector, finiteness, reader
 
-OBSTACLE_EXAMPLE = [
-    *(-0.02, 0.01, -0.1),
-    *(0.0, -0.03, 0.0),
-    *(0.0, 0.0, 0.0),
-    *(0.0, 0.1, 0.0),
-    *(0.0003, 0.003, 0.05, 1.0, 0.0),
-]
-"""An estimate of the obstacle tool O, crossing at 30 mm/s."""
 
-CAMERA_EXAMPLE = [
-    *(-0.01, -0.05, -0.08),
-    *(0.0, 0.0, 0.0),
-    *(0.0, 0.0, 0.0),
-    *(0.02, -0.1, 0.0),
-    *(0.0, 0.0, 0.0, 1.0, 0.0),
-]
-"""What is known of the endoscope, at rest; same shape as an estimate."""
+class RobotTool(NamedTuple):
+    """The robot's instrument R."""
 
-VIEW_CONE_EXAMPLE = [0.02, -0.1, 0.0, -0.41, 0.55, -0.727, 0.6]
-"""A view cone: apex, axis, half angle."""
+    fulcrum: Annotated[Vector, Field("m", "p_WG of G_R", (0.0, 0.0, 0.0))]
+    tip: Annotated[Vector, Field("m", "p_WP of R", (0.02, 0.0, -0.12))]
 
-GUIDE_EXAMPLE = [
-    *(0.012, 0.0, -0.072),
-    *(-0.01, 0.02, -0.08),
-    *(0.03, 0.6, 0.7),
-    *(-0.03, 0.0, -0.072),
-]
-"""A guide point 0.03 m from the obstacle tool."""
+
+class Shaft(NamedTuple):
+    """A tool's true shaft: a line that ends at its tip."""
+
+    tip: Annotated[Vector, Field("m", "p_WP", (0.05, 0.0, -0.12))]
+    u: Annotated[Vector, Field("1", "unit vector towards the tip", (0.0, 0.0, -1.0))]
+
+
+class TrackedShaft(NamedTuple):
+    """A shaft as the optical tracker saw it."""
+
+    tip: Annotated[Vector, Field("m", "p_WP", (0.05, 0.0, -0.12))]
+    u: Annotated[Vector, Field("1", "towards the tip", (0.0, 0.0, -1.0))]
+    time: Annotated[float, Field("s", "of exposure, -1 before the first frame", 0.0)]
+    valid: Annotated[float, Field("1", "1 if it was seen, else 0", 1.0)]
+
+
+class Estimate(NamedTuple):
+    """What is known of a tool and where it goes."""
+
+    p: Annotated[Vector, Field("m", "tip p_WP", (-0.02, 0.01, -0.1))]
+    v: Annotated[Vector, Field("m/s", "v_WP", (0.0, -0.03, 0.0))]
+    a: Annotated[Vector, Field("m/s^2", "a_WP", (0.0, 0.0, 0.0))]
+    fulcrum: Annotated[Vector, Field("m", "p_WG", (0.0, 0.1, 0.0))]
+    sigma_p: Annotated[float, Field("m", "standard deviation of the tip", 3e-4)]
+    sigma_v: Annotated[float, Field("m/s", "of its velocity", 3e-3)]
+    sigma_a: Annotated[float, Field("m/s^2", "of its acceleration", 0.05)]
+    known: Annotated[float, Field("1", "1 if it is usable, else 0", 1.0)]
+    age: Annotated[float, Field("s", "of the last good frame", 0.0)]
+
+
+class ViewCone(NamedTuple):
+    """What the endoscope sees."""
+
+    apex: Annotated[Vector, Field("m", "p_WC", (0.02, -0.1, 0.0))]
+    u: Annotated[Vector, Field("1", "unit vector of its axis", (-0.41, 0.55, -0.727))]
+    half: Annotated[float, Field("rad", "half its opening angle", 0.6)]
+
+
+class Guide(NamedTuple):
+    """The closest points of R and O, and where R's one is to go (section 4.1)."""
+
+    M_R: Annotated[Vector, Field("m", "guide point on R", (0.012, 0.0, -0.072))]
+    M_O: Annotated[Vector, Field("m", "its nearest on O", (-0.01, 0.02, -0.08))]
+    rho: Annotated[float, Field("m", "their distance", 0.03)]
+    s: Annotated[float, Field("1", "proportion of R's inserted length at M_R", 0.6)]
+    l_over_L: Annotated[float, Field("1", "proportion of O's at M_O", 0.7)]
+    M_Rf: Annotated[Vector, Field("m", "where M_R is to go", (-0.03, 0.0, -0.072))]
+
+
+class Velocity(NamedTuple):
+    """A velocity."""
+
+    v: Annotated[Vector, Field("m/s", "of a point", (0.05, 0.0, 0.0), AXES)]
+
+
+class ToolMotion(NamedTuple):
+    """A commanded motion of R."""
+
+    tip: Annotated[Vector, Field("m", "p_WP", (0.0, 0.0, -0.18))]
+    u: Annotated[Vector, Field("1", "towards the tip", (0.0, 0.0, -1.0))]
+    v: Annotated[Vector, Field("m/s", "v_WP", (0.0, 0.0, 0.0))]
+    du: Annotated[Vector, Field("1/s", "rate of u", (0.0, 0.0, 0.0))]
+    time: Annotated[float, Field("s", "at which they hold", 0.0)]
+
+
+class Permission(NamedTuple):
+    """What the passive wrist allows the task."""
+
+    speed_scale: Annotated[float, Field("1", "share of its speed, 0 to stand", 1.0)]
+    code: Annotated[float, Field("1", "why it stands: a `Stop`", 0.0)]
+
+
+FREE = Permission(1.0, 0.0)
+"""What the passive wrist permits where there is none."""
+
+
+class Point(NamedTuple):
+    """A point."""
+
+    p: Annotated[Vector, Field("m", "p_W", (0.0, 0.0, 0.0), AXES)]
+
+
+class MovingPoint(NamedTuple):
+    """A point and how it moves: the true fulcrum."""
+
+    p: Annotated[Vector, Field("m", "p_W", (0.0, 0.0, 0.0), AXES)]
+    v: Annotated[Vector, Field("m/s", "v_W", (0.0, 0.0, 0.0), ("vx", "vy", "vz"))]
+
+
+class ShaftMotion(NamedTuple):
+    """The robot's shaft as the arm's encoders have it, at the sensor S."""
+
+    p: Annotated[Vector, Field("m", "p_WS", (0.0, 0.0, 0.22), ("px", "py", "pz"))]
+    u: Annotated[Vector, Field("1", "to the tip", (0.0, 0.0, -1.0), ("ux", "uy", "uz"))]
+    v: Annotated[Vector, Field("m/s", "v_WS", (0.0, 0.0, 0.0), ("vx", "vy", "vz"))]
+    du: Annotated[
+        Vector, Field("1/s", "rate of u", (0.0, 0.0, 0.0), ("dux", "duy", "duz"))
+    ]
+
+
+class Wrench(NamedTuple):
+    """What the wall does to the shaft."""
+
+    f: Annotated[Vector, Field("N", "force", (0.1, 0.0, 0.0), ("fx", "fy", "fz"))]
+    m: Annotated[
+        Vector, Field("N m", "moment about S", (0.0, 0.02, 0.0), ("mx", "my", "mz"))
+    ]
+    valid: Annotated[float, Field("1", "1 if the sensor is alive, else 0", 1.0)]
+
+
+class Force(NamedTuple):
+    """A force."""
+
+    f: Annotated[Vector, Field("N", "on the shaft", (0.1, 0.0, 0.0), AXES)]
+
+
+class Fulcrum(NamedTuple):
+    """The fulcrum I as the force tells of it."""
+
+    p: Annotated[Vector, Field("m", "p_WI", (0.0, 0.0, 0.0), AXES)]
+    v: Annotated[Vector, Field("m/s", "v_WI", (0.0, 0.0, 0.0), ("vx", "vy", "vz"))]
+    sigma_across: Annotated[float, Field("m", "deviation across the shaft", 1e-4)]
+    sigma_along: Annotated[float, Field("m", "deviation along it", 1e-3)]
+    stiffness: Annotated[float, Field("N/m", "K", 500.0)]
+    sigma_ln_stiffness: Annotated[float, Field("1", "of its logarithm", 0.1)]
+    rate: Annotated[float, Field("Hz", "of breathing, 0 while unknown", 0.0)]
+    phase: Annotated[float, Field("1", "of the filter", 1.0)]
+    jumps: Annotated[float, Field("1", "how many were followed", 0.0)]
+    refused: Annotated[float, Field("1", "how many samples were refused", 0.0)]
+
+
+read_estimate = reader(Estimate)
+finite_estimate = finiteness(Estimate)
+finite_guide = finiteness(Guide)
+finite_tool = finiteness(RobotTool)
+finite_cone = finiteness(ViewCone)
+finite_permission = finiteness(Permission)
 
 
 @compiled
-def velocity(estimate: Numbers) -> Vector:
-    """v_WP of an estimate, m/s."""
-    return xyz(estimate, 3)
-
-
-@compiled
-def acceleration(estimate: Numbers) -> Vector:
-    """a_WP of an estimate, m/s^2."""
-    return xyz(estimate, 6)
-
-
-@compiled
-def fulcrum(estimate: Numbers) -> Vector:
-    """p_WG of an estimate, m."""
-    return xyz(estimate, 9)
-
-
-@compiled
-def usable(estimate: Numbers) -> bool:
+def usable(estimate: Estimate) -> bool:
     """True if the estimator knows the tool and gives numbers only."""
-    return estimate[15] > 0.5 and all_finite(estimate)
+    return estimate.known > 0.5 and finite_estimate(estimate)
+
+
+@compiled
+def all_usable(estimates: np.ndarray) -> bool:
+    """True if every tool's estimate (n, 17) is usable."""
+    good = True
+    for i in range(len(estimates)):
+        good = good and usable(read_estimate(estimates[i]))
+    return good

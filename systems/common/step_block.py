@@ -1,78 +1,265 @@
-"""The base of blocks whose outputs and update are one step of one function."""
+"""The base of blocks whose update is one compiled step."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+import hashlib
+from itertools import pairwise
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
 
 from systems.common.block import Block
+from systems.common.compiled import generated
+from systems.common.signal import Many, elements, flat, reading, size
+
+type Step = Callable[..., np.ndarray]
+
+
+def length(signal: Any) -> int:
+    """Number of elements of a signal, or of an array where its size stands for it."""
+    return signal if isinstance(signal, int) else size(signal)
+
+
+def _taken(signal: Any, array: str) -> str:
+    if isinstance(signal, Many):
+        return f"{array}.reshape(({len(signal.names)}, {size(signal.signal)}))"
+    return array if isinstance(signal, int) else reading(signal, array)
+
+
+def _given(signal: Any, value: str, first: int) -> list[str]:
+    if isinstance(signal, int):
+        return [f"array[{first}:{first + signal}] = {value}"]
+    if isinstance(signal, Many):
+        return [f"array[{first}:{first + size(signal)}] = {value}.ravel()"]
+    parts = enumerate(elements(signal, value), first)
+    return [f"array[{i}] = {part}" for i, part in parts]
+
+
+def wired(
+    step: Callable[..., Any],
+    constants: int,
+    states: Sequence[Any],
+    inputs: Sequence[Any],
+    gives: Sequence[Any],
+    timed: bool,
+) -> Step:
+    """A compiled step on signals as a map of the arrays that ports and context have.
+
+    Args:
+        step: A compiled function of records of constants, states, the time in s if
+            `timed`, and inputs; it returns a tuple.
+        constants: Number of records.
+        states: Signals of the states. Where a size stands instead of a signal, here
+            and below, the step takes and gives an array.
+        inputs: Signals of the inputs.
+        gives: Signals of what it returns.
+        timed: Whether the step takes the time.
+
+    Returns:
+        The map; it returns one array, what the step returns one after the other. All
+        blocks of a kind share it: compiled code is never freed.
+    """
+    return _wired(step, constants, tuple(states), tuple(inputs), tuple(gives), timed)
+
+
+@cache
+def _wired(
+    step: Callable[..., Any],
+    constants: int,
+    states: tuple[Any, ...],
+    inputs: tuple[Any, ...],
+    gives: tuple[Any, ...],
+    timed: bool,
+) -> Step:
+    kinds = [*states, *inputs]
+    records = [f"k{i}" for i in range(constants)]
+    arrays = [f"a{i}" for i in range(len(kinds))]
+    values = [f"x{i}" for i in range(len(gives))]
+    taken = [_taken(kind, array) for kind, array in zip(kinds, arrays, strict=True)]
+    for names in (arrays, taken):
+        names[len(states) : len(states)] = ["time"] if timed else []
+    given = ", ".join([*(f"{record}[0]" for record in records), *taken])
+    lines = [
+        f"{', '.join(values)}, = step({given})",
+        f"array = np.empty({sum(map(length, gives))})",
+    ]
+    first = 0
+    for signal, value in zip(gives, values, strict=True):
+        lines += _given(signal, value, first)
+        first += length(signal)
+    body = "".join(f"    {line}\n" for line in [*lines, "return array"])
+    # The cache knows a function by its name and the types of its arguments.
+    mark = hashlib.sha256(body.encode()).hexdigest()[:8]
+    name = f"{step.__name__.strip('_')}_{mark}"
+    source = f"def {name}({', '.join([*records, *arrays])}):\n{body}"
+    signals = [kind for kind in kinds if not isinstance(kind, int | Many)]
+    known = {signal.__name__: signal for signal in signals}
+    return generated(source, name, step, {**known, "step": step, "np": np})
 
 
 class StepBlock(Block):
-    """A block that computes its next state and its outputs at once.
-
-    Outputs are those of the step from the last update to now: no sample of delay.
-    Outputs and update share it, so it is computed once an instant.
-    """
+    """A block that computes its next state, and its outputs with it, in one step."""
 
     def declare_step(
         self,
-        step: Callable[..., np.ndarray],
-        inputs: Mapping[str, Sequence[float]],
-        state: Sequence[float],
-        outputs: Mapping[str, int],
+        step: Callable[..., Any],
+        constants: Sequence[np.ndarray],
+        inputs: Mapping[str, Any],
+        state: Any,
+        outputs: Mapping[str, Any],
         period: float,
         timed: bool = True,
-        defaults: Mapping[str, np.ndarray] | None = None,
+        defaults: Mapping[str, Any] | None = None,
     ) -> None:
-        """Declares ports, state and update.
+        """Declares ports, state and update; outputs are those of the step.
+
+        They are of the step from the last update to now: no sample of delay. Outputs
+        and update share it, so it is computed once an instant.
 
         Args:
-            step: Takes the state, the time in s if `timed`, and the inputs in their
-                order; returns one array, the next state and then the outputs.
-            inputs: Ports and their examples.
-            state: The state at first.
-            outputs: Ports and their sizes.
+            step: Returns the next state and the outputs; see `wired`.
+            constants: Records of constants, as `packed` makes them.
+            inputs: Ports and their signals.
+            state: The state at first: a signal's value, or an array.
+            outputs: Ports and their signals.
             period: In s.
             timed: Whether the step depends on the time.
             defaults: Values of ports that need not be connected.
         """
-        ports = [(name, self.vector_in(name, inputs[name])) for name in inputs]
-        self.DeclareDiscreteState(np.array(state, float))
-        tickets = {port.ticket() for _, port in ports} | {self.xd_ticket()}
-        spare = defaults or {}
-        always = [port for name, port in ports if name not in spare]
-        may_be = [(port, spare[name]) for name, port in ports if name in spare]
-        if [name for name, _ in ports[len(always) :]] != [*spare]:
-            raise ValueError("inputs with a default come last, in the same order")
-
-        def calc(context: Any) -> np.ndarray:
-            time = (context.get_time(),) if timed else ()
-            told = [
-                port.Eval(context) if port.HasValue(context) else value
-                for port, value in may_be
-            ]
-            return step(
-                context.get_discrete_state_vector().value(),
-                *time,
-                *[port.Eval(context) for port in always],
-                *told,
-            )
-
-        shared = self.cached(
-            "step", calc, tickets | ({self.time_ticket()} if timed else set())
+        kind = _kind(state)
+        gives = [kind, *outputs.values()]
+        run, tickets = self._runner(
+            step, constants, [kind], inputs, gives, timed, defaults or {}
         )
-        first = len(state)
-        for name, size in outputs.items():
-            self._emit(shared, name, first, size)
-            first += size
-        self.update_every(period, lambda context: shared.Eval(context)[: len(state)])
+        self.DeclareDiscreteState(_array(state))
+        shared = self.cached("step", run, tickets | {self.xd_ticket()})
+        last = length(kind)
+        self._emit(shared, outputs, last)
+        self.update_every(period, lambda context: shared.Eval(context)[:last])
 
-    def _emit(self, shared: Any, name: str, first: int, size: int) -> None:
-        last = first + size
-        self.vector_out(
-            name,
-            size,
-            lambda context: shared.Eval(context)[first:last],
-            {shared.ticket()},
+    def declare_update(
+        self,
+        update: Callable[..., Any],
+        constants: Sequence[np.ndarray],
+        inputs: Mapping[str, Any],
+        states: Mapping[str, Any],
+        period: float,
+        timed: bool = True,
+        defaults: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Declares ports and states that are outputs as well: a sample of delay.
+
+        Args:
+            update: Returns the next states; see `wired`.
+            constants: Records of constants, as `packed` makes them.
+            inputs: Ports and their signals.
+            states: Their values at first, signals or arrays, by their ports' names; of
+                a name that begins with `_` there is no port.
+            period: In s.
+            timed: Whether the update depends on the time.
+            defaults: Values of ports that need not be connected.
+        """
+        kinds = [_kind(state) for state in states.values()]
+        run, _ = self._runner(
+            update, constants, kinds, inputs, kinds, timed, defaults or {}
         )
+        for (name, state), kind in zip(states.items(), kinds, strict=True):
+            if name.startswith("_"):
+                self.DeclareDiscreteState(_array(state))
+            else:
+                self.state_out(name, kind, _array(state))
+        ends = np.cumsum([length(kind) for kind in kinds]).tolist()
+        parts = [slice(*pair) for pair in pairwise([0, *ends])]
+
+        def of_context(context: Any) -> list[np.ndarray]:
+            array = run(context)
+            return [array[part] for part in parts]
+
+        self.update_every(period, run if len(kinds) == 1 else of_context)
+
+    def declare_map(
+        self,
+        function: Callable[..., Any],
+        constants: Sequence[np.ndarray],
+        inputs: Mapping[str, Any],
+        output: str,
+        signal: Any,
+    ) -> None:
+        """Declares ports, of which one is a map of the others: no state, no time.
+
+        Args:
+            function: Returns the output, as a tuple of one; see `wired`.
+            constants: Records of constants, as `packed` makes them.
+            inputs: Ports and their signals.
+            output: The port of the output.
+            signal: Its signal.
+        """
+        run, tickets = self._runner(
+            function, constants, [], inputs, [signal], False, {}
+        )
+        self.signal_out(output, signal, run, tickets)
+
+    def _runner(
+        self,
+        step: Callable[..., Any],
+        constants: Sequence[np.ndarray],
+        states: Sequence[Any],
+        inputs: Mapping[str, Any],
+        gives: Sequence[Any],
+        timed: bool,
+        defaults: Mapping[str, Any],
+    ) -> tuple[Callable[[Any], np.ndarray], set[Any]]:
+        """The step as a function of the context, and the tickets of what it reads."""
+        run = wired(step, len(constants), states, list(inputs.values()), gives, timed)
+        ports = {name: self.signal_in(name, inputs[name]) for name in inputs}
+        reads: list[Callable[[Any], Any]] = [
+            *(_state_reader(group) for group in range(len(states))),
+            *([methodcaller("get_time")] if timed else []),
+            *(_port_reader(ports[name], defaults.get(name)) for name in inputs),
+        ]
+
+        def of_context(context: Any) -> np.ndarray:
+            return run(*constants, *[read(context) for read in reads])
+
+        tickets = {port.ticket() for port in ports.values()}
+        return of_context, tickets | ({self.time_ticket()} if timed else set())
+
+    def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
+        """Declares outputs that are the shared array's parts from `first` on."""
+        for name, signal in outputs.items():
+            last = first + length(signal)
+
+            def part(context: Any, first: int = first, last: int = last) -> np.ndarray:
+                array: np.ndarray = shared.Eval(context)
+                return array[first:last]
+
+            self.signal_out(name, signal, part, {shared.ticket()})
+            first = last
+
+
+def _state_reader(group: int) -> Callable[[Any], np.ndarray]:
+    """What reads a group of discrete state without a copy."""
+
+    def read(context: Any) -> np.ndarray:
+        state: np.ndarray = context.get_discrete_state(group).value()
+        return state
+
+    return read
+
+
+def _port_reader(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
+    """What reads a port; its default, if it has one, where it is not connected."""
+    read: Callable[[Any], np.ndarray] = port.Eval
+    if default is None:
+        return read
+    is_told, instead = port.HasValue, flat(default)
+    return lambda context: read(context) if is_told(context) else instead
+
+
+def _kind(state: Any) -> Any:
+    return len(state) if isinstance(state, np.ndarray) else type(state)
+
+
+def _array(state: Any) -> np.ndarray:
+    return state if isinstance(state, np.ndarray) else flat(state)

@@ -5,103 +5,86 @@ view "by following the surgeon's tool S with the camera and forcing the robot to
 to be within the view field".
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from typing import Any
 
 import numpy as np
 
-from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import (
-    Vector,
-    all_finite,
     along,
     limited,
     norm,
+    plus,
+    scaled,
     sub,
     unit,
     xyz,
 )
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Vector, finiteness
+from systems.common.signals import Estimate, Point, Shaft, ViewCone
+from systems.common.step_block import StepBlock
+
+finite_point = finiteness(Point)
 
 
 @dataclass
 class EndoscopeParams:
-    """A straight endoscope and the way it is led. Frame W, SI units."""
+    """A straight endoscope and the way it is led."""
 
-    # Time between updates in s.
-    period: float = 1.0 / 60.0
-    # The fulcrum G_C, in m.
-    p_WG: list[float] = field(default_factory=lambda: [0.0, -0.08, 0.0])
-    # Where S's tip is expected before it is seen, in m; the camera looks there first.
-    p_WS: list[float] = field(default_factory=lambda: [0.0, 0.0, -0.13])
-    # How far short of S's tip the camera's tip stays, in m.
-    standoff: float = 0.07
-    # Its tip is at least and at most so far inside the fulcrum, in m.
-    min_insertion: float = 0.03
-    max_insertion: float = 0.25
-    # Half the opening angle of the field of view, in rad (70 degrees in all).
-    half_angle: float = math.radians(35.0)
-    # How fast the distance to the wanted place is made good, in 1/s.
-    rate: float = 1.5
-    # Limits of the camera tip's speed in m/s, and of its change in m/s^2.
-    max_speed: float = 0.03
-    max_acceleration: float = 0.1
+    period: float = parameter(1 / 60, "of the update", "s", above=0, most=1)
+    p_WG: list[float] = parameter(
+        [0.0, -0.08, 0.0], "its fulcrum G_C in W", "m", least=-1, most=1, shape=(3,)
+    )
+    # The camera looks there first.
+    p_WS: list[float] = parameter(
+        [0.0, 0.0, -0.13], "where S is expected", "m", least=-1, most=1, shape=(3,)
+    )
+    standoff: float = parameter(
+        0.07, "how far short of S's tip its own tip stays", "m", above=0, most=0.3
+    )
+    min_insertion: float = parameter(
+        0.03, "of its tip below the fulcrum, at the least", "m", above=0, most=0.3
+    )
+    max_insertion: float = parameter(
+        0.25, "of its tip below the fulcrum, at the most", "m", above=0, most=0.5
+    )
+    half_angle: float = parameter(
+        math.radians(35.0), "half the field of view", "rad", least=0.1, most=1.5
+    )
+    rate: float = parameter(
+        1.5,
+        "how fast the way to the wanted place is made good",
+        "1/s",
+        above=0,
+        most=20,
+    )
+    max_speed: float = parameter(0.03, "of its tip", "m/s", above=0, most=0.5)
+    max_acceleration: float = parameter(0.1, "of its tip", "m/s^2", above=0, most=5)
 
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        for name in ("p_WG", "p_WS"):
-            value = getattr(self, name)
-            if len(value) != 3 or not all(map(math.isfinite, value)):
-                raise ValueError(f"endoscope: {name}={value} must be 3 finite numbers")
-        for name in (
-            "period",
-            "standoff",
-            "min_insertion",
-            "rate",
-            "max_speed",
-            "max_acceleration",
-        ):
-            number = getattr(self, name)
-            if not 0.0 < number < math.inf:
-                raise ValueError(f"endoscope: {name}={number} must be finite and > 0")
-        if not self.min_insertion < self.max_insertion < math.inf:
-            raise ValueError(
-                f"endoscope: max_insertion={self.max_insertion} m must be over "
-                f"min_insertion={self.min_insertion} m"
-            )
-        if not 0.0 < self.half_angle < 0.5 * math.pi:
-            raise ValueError(
-                f"endoscope: half_angle={self.half_angle} rad must lie in (0, pi/2); "
-                f"is it in degrees?"
-            )
-        if self.rate * self.period >= 1.0:
-            raise ValueError(
-                f"endoscope: rate={self.rate} /s is too fast for period={self.period} "
-                f"s, expected less than {1.0 / self.period:.4g} /s"
-            )
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        inserted = self.min_insertion < self.max_insertion
+        yield inserted, "max_insertion", f"over min_insertion, {self.min_insertion} m"
+        fastest = 1.0 / self.period
+        slow = self.rate < fastest
+        yield slow, "rate", f"less than 1 / period, {fastest:.4g} /s"
         # A camera that cannot brake as fast as its rate asks would overshoot.
-        if self.rate * self.max_speed > self.max_acceleration:
-            raise ValueError(
-                f"endoscope: max_acceleration={self.max_acceleration} m/s^2 is too low "
-                f"for rate={self.rate} /s at max_speed={self.max_speed} m/s, expected "
-                f"at least {self.rate * self.max_speed:.4g} m/s^2"
-            )
-        depth = self.p_WG[2] - self.p_WS[2]
-        if not depth > self.min_insertion:
-            raise ValueError(
-                f"endoscope: p_WS={self.p_WS} must lie below the fulcrum "
-                f"p_WG={self.p_WG} by more than min_insertion={self.min_insertion} m"
-            )
+        least = self.rate * self.max_speed
+        yield (
+            self.max_acceleration >= least,
+            "max_acceleration",
+            f"at least rate max_speed, {least:.4g} m/s^2",
+        )
+        deep = self.p_WG[2] - self.p_WS[2] > self.min_insertion
+        yield deep, "p_WS", "a point below p_WG by more than min_insertion"
 
 
 def constants(params: EndoscopeParams) -> np.ndarray:
-    """The parameters as the compiled functions take them.
-
-    Raises:
-        ValueError: If `params` make no sense.
-    """
-    params.check()
+    """The parameters as the compiled functions take them."""
+    check(params)
     return packed(params)
 
 
@@ -140,95 +123,69 @@ def follow(
     wanted = (0.0, 0.0, 0.0)
     if is_known:
         d = sub(wanted_tip(params, target), p)
-        rate = params.rate
-        wanted = limited((rate * d[0], rate * d[1], rate * d[2]), params.max_speed)
+        wanted = limited(scaled(params.rate, d), params.max_speed)
     change = limited(sub(wanted, v), params.max_acceleration * params.period)
-    v = along(v, 1.0, change)
+    v = plus(v, change)
     return along(p, params.period, v), v
 
 
 @compiled
-def _camera(params: Any, p: Vector, v: Vector) -> np.ndarray:
-    """The state: shaft p_WC, u_W and half angle (7), and v_WC (3)."""
-    u = unit(sub(p, xyz(params.p_WG, 0)))
-    return np.array(p + u + (params.half_angle,) + v)
+def _camera(params: Any, p: Vector, v: Vector) -> tuple[ViewCone, Shaft, Estimate]:
+    """The camera with its tip at p_WC: all that is said of it."""
+    none = (0.0, 0.0, 0.0)
+    fulcrum = xyz(params.p_WG, 0)
+    u = unit(sub(p, fulcrum))
+    estimate = Estimate(p, v, none, fulcrum, 0.0, 0.0, 0.0, 1.0, 0.0)
+    return ViewCone(p, u, params.half_angle), Shaft(p, u), estimate
 
 
 @compiled
-def _start(record: np.ndarray) -> np.ndarray:
+def _start(record: np.ndarray) -> tuple[ViewCone, Shaft, Estimate]:
     params = record[0]
     return _camera(params, wanted_tip(params, xyz(params.p_WS, 0)), (0.0, 0.0, 0.0))
 
 
 @compiled
 def _follow(
-    record: np.ndarray, cone: np.ndarray, v: np.ndarray, estimate: np.ndarray
-) -> np.ndarray:
-    params = record[0]
-    target = xyz(estimate, 0)
-    is_known = estimate[15] > 0.5 and all_finite(target)
-    p, v_WC = follow(params, xyz(cone, 0), xyz(v, 0), target, is_known)
-    return _camera(params, p, v_WC)
+    params: Any, cone: ViewCone, shaft: Shaft, camera: Estimate, target: Estimate
+) -> tuple[ViewCone, Shaft, Estimate]:
+    is_known = target.known > 0.5 and finite_point(Point(target.p))
+    p, v = follow(params, camera.p, camera.v, target.p, is_known)
+    return _camera(params, p, v)
 
 
-@compiled
-def _estimate(cone: np.ndarray, v: np.ndarray, p_WG: Vector) -> np.ndarray:
-    """The endoscope as the estimates (17) of the surgeon's tools."""
-    none = (0.0, 0.0, 0.0)
-    known = (0.0, 0.0, 0.0, 1.0, 0.0)
-    return np.array(xyz(cone, 0) + xyz(v, 0) + none + p_WG + known)
-
-
-class Endoscope(Block):
+class Endoscope(StepBlock):
     """Follows the surgeon's target tool S and gives the field of view (section 2.1).
 
     The camera looks along its shaft, which passes its own fulcrum G_C. It turns towards
     S's tip and stays a set distance short of it, smoothly and slowly, as a surgeon
     wants the picture; it comes to rest while S is not known. No roll.
 
-    Port ``target`` accepts S's estimate (17), of which p_WP in m, world frame W, and
-    known are used. Port ``view_cone`` emits (7): apex p_WC in m, the unit vector of
-    its axis, in W, and half its opening angle in rad. Port ``shaft`` emits the
-    endoscope's shaft (6): tip p_WC in m and unit vector u_W, from outside to the tip.
-    Port ``estimate`` emits what is known of it as of a surgeon's tool (17): p_WC in m,
-    v_WC in m/s, no acceleration, the fulcrum p_WG in m, no deviations, known, age 0.
-
-    Args:
-        params: The endoscope and its limits.
-
-    Raises:
-        ValueError: If `params` make no sense.
+    Port ``target`` accepts the `Estimate` of S, of which its tip and known are used.
+    Port ``view_cone`` emits the `ViewCone`.
+    Port ``shaft`` emits the endoscope's own `Shaft`.
+    Port ``estimate`` emits what is known of it as of a surgeon's tool, an `Estimate`
+    without acceleration and deviations.
     """
 
     def __init__(self, params: EndoscopeParams | None = None) -> None:
+        """Makes the block.
+
+        Args:
+            params: The endoscope and its limits.
+
+        Raises:
+            ParameterError: If `params` make no sense.
+        """
         super().__init__()
         params = params or EndoscopeParams()
-        self._constants = constants(params)
-        self._target = self.vector_in(
-            "target",
-            [0.0, 0.0, -0.13, *[0.0] * 6, 0.05, 0.0, 0.0, 1e-3, 1e-2, 0.1, 1.0, 0.02],
+        record = constants(params)
+        states = zip(("view_cone", "shaft", "estimate"), _start(record), strict=True)
+        self.declare_update(
+            _follow,
+            [record],
+            {"target": Estimate},
+            dict(states),
+            params.period,
+            timed=False,
         )
-        start = _start(self._constants)
-        self._cone = self.state_out("view_cone", start[:7])
-        self.state_out("shaft", start[:6])
-        self._velocity = self.DeclareDiscreteState(start[7:])
-        x, y, z = params.p_WG
-        self._p_WG = (float(x), float(y), float(z))
-        self.vector_out("estimate", 17, self._calc_estimate, {self.xd_ticket()})
-        self.update_every(params.period, self._update)
-
-    def _calc_estimate(self, context: Any) -> np.ndarray:
-        return _estimate(
-            context.get_discrete_state(self._cone).value(),
-            context.get_discrete_state(self._velocity).value(),
-            self._p_WG,
-        )
-
-    def _update(self, context: Any) -> tuple[np.ndarray, ...]:
-        state = _follow(
-            self._constants,
-            context.get_discrete_state(self._cone).value(),
-            context.get_discrete_state(self._velocity).value(),
-            self._target.Eval(context),
-        )
-        return state[:7], state[:6], state[7:]

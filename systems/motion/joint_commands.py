@@ -9,54 +9,58 @@ long; the tests hold the two against each other.)
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import quadprog
 
 from plants.arm.arm import ArmParams, SetPoint
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
-from plants.arm.parameters import READY_POSTURE
+from plants.arm.parameters import JOINTS, READY_POSTURE
+from plants.arm.signals import ArmState, Posture
 from plants.instruments.instrument import InstrumentParams
 from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import Vector, all_finite, along, cross, sub, xyz
+from systems.common.geometry import Vector, along, cross, sub
+from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tool_state
+from systems.common.signal import Field, finiteness, flat, reader, size
+from systems.common.signals import ToolMotion
+from systems.common.step_block import wired
+
+
+class Status(NamedTuple):
+    """Whether the arm follows."""
+
+    code: Annotated[
+        float, Field("1", "1 while joint limits keep it from following, else 0", 0.0)
+    ]
+
+
+read_tool = reader(ToolMotion)
+finite_motion = finiteness(ToolMotion)
 
 
 @dataclass
 class JointCommandsParams:
-    """Parameters of `JointCommands`.
+    """Parameters of `JointCommands`."""
 
-    Attributes:
-        period: Of the set-points [s].
-        gain: Share of the pose error that is taken away in one period.
-        centering: Rate at which the spare joint returns to the ready posture [1/s].
-        joint_speed: Share of the joints' rated speeds that may be used.
-        joint_margin: Distance kept from the joints' end stops [rad].
-        shortfall: Error of the tool's velocity [m/s, rad/s] from which the limits are
-            said to keep the arm from following.
-    """
-
-    period: float = 1.0 / 120.0
-    gain: float = 0.3
-    centering: float = 0.2
-    joint_speed: float = 0.8
-    joint_margin: float = 0.03
-    shortfall: float = 0.005
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        if not self.period > 0.0:
-            raise ValueError(f"joint_commands.period={self.period} s: expected > 0")
-        for name in ("gain", "joint_speed"):
-            value = getattr(self, name)
-            if not 0.0 < value <= 1.0:
-                raise ValueError(f"joint_commands.{name}={value}: expected in (0, 1]")
-        for name in ("centering", "joint_margin", "shortfall"):
-            value = getattr(self, name)
-            if value < 0.0:
-                raise ValueError(f"joint_commands.{name}={value}: expected >= 0")
+    period: float = parameter(1 / 120, "of the set-points", "s", above=0, most=0.1)
+    gain: float = parameter(
+        0.3, "share of the pose error that a period takes away", above=0, most=1
+    )
+    centering: float = parameter(
+        0.2, "rate of the spare joint to the ready posture", "1/s", least=0, most=10
+    )
+    joint_speed: float = parameter(
+        0.8, "share of the joints' rated speeds that may be used", above=0, most=1
+    )
+    joint_margin: float = parameter(
+        0.03, "distance kept from the joints' end stops", "rad", least=0, most=0.5
+    )
+    shortfall: float = parameter(
+        0.005, "error of the tool's velocity that is told", "m/s", least=0, most=0.05
+    )
 
 
 _BOUNDS = np.hstack([np.eye(7), -np.eye(7)])
@@ -139,7 +143,7 @@ def joint_velocity(
 def tool_twist(
     p_WT: Numbers,
     u_WT: Numbers,
-    tool: Numbers,
+    tool: ToolMotion,
     now: float,
     period: float,
     gain: float,
@@ -149,7 +153,7 @@ def tool_twist(
     Args:
         p_WT: Where the commanded posture has the tip, in W [m].
         u_WT: Its shaft's direction in W.
-        tool: The command: p_WP, u_W, v_WP, du_W/dt, time [s].
+        tool: The command.
         now: Time [s] of p_WT and u_WT.
         period: How long the velocity will hold [s].
         gain: Share of the remaining error taken away in it.
@@ -158,18 +162,17 @@ def tool_twist(
         Angular and translational velocity (w, v) in W [rad/s, m/s]; there is no
         rotation about the shaft: the roll is kept.
     """
-    ahead = now - tool[12]
+    ahead = now - tool.time
     rate = gain / period
-    v_WP, du_W = xyz(tool, 6), xyz(tool, 9)
-    p = along(xyz(tool, 0), ahead, v_WP)
-    u = along(xyz(tool, 3), ahead, du_W)
-    v = along(v_WP, rate, sub(p, p_WT))
-    return cross(u, along(du_W, rate, sub(u, u_WT))), v
+    p = along(tool.tip, ahead, tool.v)
+    u = along(tool.u, ahead, tool.du)
+    v = along(tool.v, rate, sub(p, p_WT))
+    return cross(u, along(tool.du, rate, sub(u, u_WT))), v
 
 
 @compiled
 def problem(
-    constants: Any, arm: Any, q: np.ndarray, tool: np.ndarray, time: float
+    constants: Any, arm: Any, q: np.ndarray, tool: ToolMotion, time: float
 ) -> tuple[np.ndarray, ...]:
     """The quadratic program of an instant, as `joint_velocity` takes it.
 
@@ -177,7 +180,7 @@ def problem(
         constants: A record of `JointCommands`.
         arm: A record of `read_arm`.
         q: Commanded joint positions (7) [rad].
-        tool: The command (13).
+        tool: The command.
         time: Now [s].
 
     Returns:
@@ -197,14 +200,21 @@ def problem(
 
 
 @compiled
+def _problem(
+    record: np.ndarray, arm: np.ndarray, q: np.ndarray, tool: np.ndarray, time: float
+) -> tuple[np.ndarray, ...]:
+    return problem(record[0], arm[0], q, read_tool(tool), time)
+
+
+@compiled
 def command(
     constants: Any,
     q: np.ndarray,
     v: np.ndarray,
     weight: np.ndarray,
     shortfall: float,
-) -> np.ndarray:
-    """The next state: posture (7), the servos' set-point (14), status (1).
+) -> tuple[np.ndarray, np.ndarray, Status]:
+    """The next posture (7), the servos' set-point (14), and the status.
 
     Args:
         constants: A record of `JointCommands`.
@@ -213,29 +223,29 @@ def command(
         weight: Torques of the load's weight (7) [Nm].
         shortfall: How much of the tool's velocity is missing [m/s, rad/s].
     """
-    state = np.zeros(22)
-    state[:7] = q + constants.period * v
+    set_point = np.zeros(2 * JOINTS)
     # As `SetPoint` says.
-    state[7:14] = q + constants.lead * v - constants.compliance * weight
-    state[21] = 1.0 if shortfall > constants.shortfall else 0.0
-    return state
+    set_point[:JOINTS] = q + constants.lead * v - constants.compliance * weight
+    short = 1.0 if shortfall > constants.shortfall else 0.0
+    return q + constants.period * v, set_point, Status(short)
 
 
 @compiled
 def _free_step(
-    record: np.ndarray, arm: np.ndarray, q: np.ndarray, tool: np.ndarray, time: float
-) -> tuple[np.ndarray, bool]:
-    """The next state, and whether the free minimum keeps the bounds."""
-    constants = record[0]
-    if not all_finite(tool):  # hold still
-        weight = tool_state(arm[0], q)[3]
-        return command(constants, q, np.zeros(7), weight, np.inf), True
-    J, V, v_nominal, low, high, weight = problem(constants, arm[0], q, tool, time)
+    constants: Any, arm: Any, q: np.ndarray, time: float, tool: ToolMotion
+) -> tuple[np.ndarray, np.ndarray, Status, float]:
+    """What `command` gives, and 1 if the free minimum keeps the bounds, else 0."""
+    if not finite_motion(tool):  # hold still
+        weight = tool_state(arm, q)[3]
+        return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (1.0,)
+    J, V, v_nominal, low, high, weight = problem(constants, arm, q, tool, time)
     v = free_velocity(J, V, v_nominal)
-    for i in range(7):
+    shortfall = np.abs(product(J, v) - V).max()
+    is_free = 1.0
+    for i in range(JOINTS):
         if not low[i] <= v[i] <= high[i]:
-            return np.zeros(22), False
-    return command(constants, q, v, weight, np.abs(product(J, v) - V).max()), True
+            is_free = 0.0
+    return command(constants, q, v, weight, shortfall) + (is_free,)
 
 
 class JointCommands(Block):
@@ -244,14 +254,13 @@ class JointCommands(Block):
     The posture is integrated in the state; its own forward kinematics closes the
     loop, so nothing drifts. The instrument's weight is fed forward.
 
-    Port ``tool`` accepts p_WP [m], u_W, v_WP [m/s], du_W/dt [1/s] and the time
-    [s] they hold at (13).
+    Port ``tool`` accepts the `ToolMotion`.
 
-    Port ``set_point`` emits the desired state that the arm's servos take (14).
+    Port ``set_point`` emits the `ArmState` that the arm's servos take.
 
-    Port ``posture`` emits the commanded joint positions (7) [rad].
+    Port ``posture`` emits the commanded `Posture`.
 
-    Port ``status`` emits 0, or 1 while joint limits keep the arm from following (1).
+    Port ``status`` emits the `Status`.
     """
 
     def __init__(
@@ -263,38 +272,38 @@ class JointCommands(Block):
     ) -> None:
         """Makes the block for an arm's servos, starting at a posture (7) [rad]."""
         super().__init__()
-        self._params = params or JointCommandsParams()
-        self._params.check()
+        params = params or JointCommandsParams()
+        check(params)
         plant = make_controller_plant(instrument=instrument)
         self._arm = read_arm(plant, plant.GetFrameByName(INSTRUMENT_TIP))
-        set_point = SetPoint(arm, self._params.period)
+        set_point = SetPoint(arm, params.period)
         nominal = np.array(posture, float)
-        margin = self._params.joint_margin
         self._constants = packed(
-            self._params,
+            params,
             nominal=nominal,
-            low=plant.GetPositionLowerLimits() + margin,
-            high=plant.GetPositionUpperLimits() - margin,
-            speed=self._params.joint_speed * plant.GetVelocityUpperLimits(),
+            low=plant.GetPositionLowerLimits() + params.joint_margin,
+            high=plant.GetPositionUpperLimits() - params.joint_margin,
+            speed=params.joint_speed * plant.GetVelocityUpperLimits(),
             lead=set_point.lead,
             compliance=set_point.compliance,
         )
-        p, u, _, weight = tool_state(self._arm[0], nominal)
-        self._tool = self.vector_in("tool", [*p, *u, *[0.0] * 6, 0.0])
-        still = command(self._constants[0], nominal, np.zeros(7), weight, 0.0)
-        self._posture = self.state_out("posture", nominal)
-        self.state_out("set_point", still[7:21])
-        self.state_out("status", [0.0])
-        self.update_every(self._params.period, self._update)
+        signals = {"posture": Posture, "set_point": ArmState, "status": Status}
+        sizes = [*map(size, signals.values()), 1]
+        self._step = wired(_free_step, 2, [JOINTS], [ToolMotion], sizes, True)
+        self._tool = self.signal_in("tool", ToolMotion)
+        _, _, _, weight = tool_state(self._arm[0], nominal)
+        start = command(self._constants[0], nominal, np.zeros(JOINTS), weight, 0.0)
+        for (name, signal), state in zip(signals.items(), start, strict=True):
+            self.state_out(name, signal, flat(state))
+        self.update_every(params.period, self._update)
 
-    def _update(self, context: Any) -> tuple[np.ndarray, ...]:
-        q = context.get_discrete_state(self._posture).value()
-        tool = self._tool.Eval(context)
-        time = context.get_time()
-        state, is_free = _free_step(self._constants, self._arm, q, tool, time)
-        if not is_free:
-            constants, arm = self._constants[0], self._arm[0]
-            J, V, *bounds, weight = problem(constants, arm, q, tool, time)
-            v = joint_velocity(J, V, *bounds)
-            state = command(constants, q, v, weight, abs(J @ v - V).max())
-        return state[:7], state[7:21], state[21:]
+    def _update(self, context: Any) -> Sequence[Any]:
+        q = context.get_discrete_state(0).value()
+        tool, time = self._tool.Eval(context), context.get_time()
+        step = self._step(self._constants, self._arm, q, time, tool)
+        is_free = step[-1]
+        if is_free:
+            return step[:JOINTS], step[JOINTS:-2], step[-2:-1]
+        J, V, *bounds, weight = _problem(self._constants, self._arm, q, tool, time)
+        v = joint_velocity(J, V, *bounds)
+        return command(self._constants[0], q, v, weight, abs(J @ v - V).max())

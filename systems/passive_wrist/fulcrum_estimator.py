@@ -3,15 +3,26 @@
 The algorithm stands in `fulcrum_tracker`, the filter in `fulcrum_filter`.
 """
 
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from systems.common.block import Block
+from systems.common.signal import Field
+from systems.common.signals import Fulcrum, ShaftMotion, Wrench
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
 
-__all__ = ["FulcrumEstimator", "FulcrumParams"]
+type Matrix = tuple[float, float, float, float, float, float, float, float, float]
+
+_ENTRIES = tuple(f"{a}{b}" for a in "xyz" for b in "xyz")
+_EXAMPLE = (1e-8, 0.0, 0.0, 0.0, 1e-8, 0.0, 0.0, 0.0, 1e-6)
+
+
+class Covariance(NamedTuple):
+    """Of the fulcrum."""
+
+    P: Annotated[Matrix, Field("m^2", "of p_WI, row by row", _EXAMPLE, _ENTRIES)]
 
 
 class FulcrumEstimator(Block):
@@ -23,17 +34,14 @@ class FulcrumEstimator(Block):
     reading (they are feedthrough), between instants the state's. Without a valid
     reading it goes on predicting.
 
-    Port ``shaft`` accepts p_WS [m], u_W, v_WS [m/s], du_W/dt [1/s] (12).
+    Port ``shaft`` accepts the `ShaftMotion`.
 
-    Port ``wrench`` accepts the wall's force on the shaft [N], its moment about the
-    sensor's origin [N m], and 1 if the sensor is alive (7).
+    Port ``wrench`` accepts the `Wrench`.
 
-    Port ``estimate`` emits p_WI [m] and v_WI [m/s] now, sigma across the shaft and
-    along it [m], stiffness [N/m], sigma of its logarithm, breathing rate [Hz, 0 if
-    none is seen], phase (0 before the first reading, 1 following, 2 the wall's
-    motion understood), jumps followed and estimates refused so far (14).
+    Port ``estimate`` emits the `Fulcrum` now; its phase is 0 before the first reading,
+    1 while it follows, 2 once the wall's motion is understood.
 
-    Port ``covariance`` emits the covariance of p_WI, row by row (9), in m^2.
+    Port ``covariance`` emits the `Covariance`.
     """
 
     def __init__(self, params: FulcrumParams | None = None) -> None:
@@ -41,11 +49,9 @@ class FulcrumEstimator(Block):
         super().__init__()
         self._p = params or FulcrumParams()
         self._tracker = FulcrumTracker(self._p)
-        self._shaft = self.vector_in(
-            "shaft", [0.0, 0.0, 0.22, 0.0, 0.0, -1.0, *[0.0] * 6]
-        )
-        self._wrench = self.vector_in("wrench", [0.1, 0.0, 0.0, 0.0, 0.02, 0.0, 1.0])
-        self._state = self.DeclareDiscreteState(self._tracker.initial())
+        self._shaft = self.signal_in("shaft", ShaftMotion)
+        self._wrench = self.signal_in("wrench", Wrench)
+        self.DeclareDiscreteState(self._tracker.initial())
         self._time = self._tracker.at("time")
         read = {
             self.xd_ticket(),
@@ -54,23 +60,23 @@ class FulcrumEstimator(Block):
             self._wrench.ticket(),
         }
         self._posterior = self.cached("posterior", self._calc_posterior, read)
-        after = {self._posterior.ticket(), self.time_ticket()}
-        self.vector_out("estimate", 14, self._calc_estimate, after)
-        self.vector_out("covariance", 9, self._calc_covariance, after)
+        after = {self._posterior.ticket(), self.time_ticket(), self._shaft.ticket()}
+        self.signal_out("estimate", Fulcrum, self._calc_estimate, after)
+        self.signal_out("covariance", Covariance, self._calc_covariance, after)
         self.update_every(self._p.period, self._posterior.Eval)
 
     def _calc_posterior(self, context: Any) -> np.ndarray:
         """The state with this instant's reading, once and only once."""
-        state = context.get_discrete_state(self._state).value()
+        state = context.get_discrete_state_vector().value()
         time = context.get_time()
         if time - state[self._time] < 0.5 * self._p.period:
             return state.copy()
         shaft, wrench = self._shaft.Eval(context), self._wrench.Eval(context)
         return self._tracker.step(state, shaft, wrench, time)
 
-    def _calc_estimate(self, context: Any) -> Any:
-        z, u = self._posterior.Eval(context), self._shaft.Eval(context)[3:6]
-        return self._tracker.report(z, u, context.get_time())
+    def _calc_estimate(self, context: Any) -> np.ndarray:
+        z, shaft = self._posterior.Eval(context), self._shaft.Eval(context)
+        return self._tracker.report(z, context.get_time(), shaft)
 
-    def _calc_covariance(self, context: Any) -> Any:
-        return self._tracker.covariance(self._posterior.Eval(context)).reshape(-1)
+    def _calc_covariance(self, context: Any) -> np.ndarray:
+        return self._tracker.covariance(self._posterior.Eval(context))

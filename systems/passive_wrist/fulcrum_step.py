@@ -1,38 +1,57 @@
 """One step of the fulcrum tracker, compiled: policy round the filter's arithmetic.
 
-What it decides, and why, stands in `fulcrum_tracker`; the layout of z as well.
+What it decides, and why, stands in `fulcrum_tracker`. All it remembers is one array z:
+x (n), P (n n), the record (120 entries), the sums for its next entry, the scalars
+named below, and each harmonic's rms in m when the breathing was found.
 """
 
 from math import cos, exp, pi, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.compiled import compiled
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import across, along, dot, over, plus, scaled, sub, xyz
+from systems.common.parameter import check
+from systems.common.signal import finiteness, reader, writer
+from systems.common.signals import Fulcrum, ShaftMotion, Wrench
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_kernels import (
-    add_to_record,
+    LN_K,
+    LN_OMEGA,
+    RECORD_PERIOD,
+    WIDTH,
+    Sample,
+    covariance,
+    entry_of,
     innovate,
     predict,
     spread,
     update,
+    write_entry,
 )
 
 Floats = np.ndarray
 
-BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0
-"""Phases."""
-AUX = (
-    *("phase", "steps", "unlikely", "guard", "nis", "recorded", "agreed", "found"),
-    *("jumps", "refused", "force", "walk", "summed", "time", "due"),
-)
-"""Scalars of the tracker's state; `FulcrumTracker` says what they are."""
-_PHASE, _STEPS, _UNLIKELY, _GUARD, _NIS, _RECORDED, _AGREED = range(7)
-_JUMPS, _REFUSED, _FORCE, _WALK, _SUMMED, _TIME, _DUE = range(8, 15)
-LEAST_BREATHING = 2e-4
-"""Rms of the first harmonic from which there is breathing to speak of [m]."""
 RECORD = 120
 """Entries of the record."""
-WIDTH = 13
-"""Numbers of an entry."""
+SCALARS = (
+    *("phase", "steps", "unlikely", "guard", "nis", "recorded", "agreed", "found"),
+    *("jumps", "refused", "walk", "summed", "time", "due"),
+)
+"""Phase; steps so far; unlikely samples in a row; s of guard left after a jump; nis,
+smoothed normalised innovation squared / 4 (1 = as expected); entries recorded; looks in
+a row that agreed on a rate; the rate found, in Hz; jumps followed; estimates refused;
+walk of the mean once the wall is understood, in m/sqrt(s); samples summed; time of the
+last update in s; 1 if an entry was just added."""
+(PHASE, STEPS, UNLIKELY, GUARD, NIS, RECORDED, AGREED, FOUND) = range(8)
+(JUMPS, REFUSED, WALK, SUMMED, TIME, DUE) = range(8, len(SCALARS))
+BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0
+"""Phases."""
+LEAST_BREATHING = 2e-4
+"""Rms of the first harmonic from which there is breathing to speak of [m]."""
+LEAST_RMS = 3e-4
+"""Rms that a harmonic is taken to have at the least, for its walk [m]."""
 _JUMP_NIS = 30.0  # normalised innovation squared of a jump
 _GUARD_TIME = 0.1  # s after a jump in which only the mean is updated
 _GUARD_WALK = 0.05  # m/sqrt(s): the rest of a jump that takes more than two samples
@@ -40,203 +59,245 @@ _LARGEST_JUMP = 0.02  # [m]
 _UNDERSTOOD = 4.0  # times the force above which the stiffness is learnt
 _DEPTH_UNKNOWN = 6e-3  # [m] sigma along the shaft
 
+read_shaft, read_wrench = reader(ShaftMotion), reader(Wrench)
+write_fulcrum = writer(Fulcrum)
+finite_shaft, finite_wrench = finiteness(ShaftMotion), finiteness(Wrench)
+
+
+def constants(params: FulcrumParams) -> Floats:
+    """The parameters as the compiled functions take them.
+
+    With `n`, `every`: samples in an entry of the record, and where in z its parts
+    begin.
+    """
+    check(params, "fulcrum_estimator")
+    n = 5 + 6 * params.harmonics
+    lengths = (n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS), params.harmonics)
+    names = ("P", "record", "sums", "scalars", "rms", "end")
+    places = dict(zip(names, np.cumsum(lengths).tolist(), strict=True))
+    every = max(1, round(RECORD_PERIOD / params.period))
+    return packed(params, n=n, every=float(every), **places)
+
+
+class Memory(NamedTuple):
+    """The parts of z.
+
+    Attributes:
+        x: State, shape (n,).
+        P: Its covariance, shape (n, n).
+        record: Entries, the oldest first, shape (120, 13).
+        sums: For its next entry, shape (13,).
+        scalars: See `SCALARS`.
+        rms: Of each harmonic, in m.
+    """
+
+    x: Floats
+    P: Floats
+    record: Floats
+    sums: Floats
+    scalars: Floats
+    rms: Floats
+
 
 @compiled
-def to_first_force(
-    x: Floats, P: Floats, a: Floats, guess_sigma: float, noise: Floats
-) -> None:
+def memory(packed: Floats, z: Floats) -> Memory:
+    """The parts of z; nothing is copied."""
+    c = packed[0]
+    n = c.n
+    return Memory(
+        z[:n],
+        z[n : c.record].reshape((n, n)),
+        z[c.record : c.sums].reshape((RECORD, WIDTH)),
+        z[c.sums : c.scalars],
+        z[c.scalars : c.rms],
+        z[c.rms :],
+    )
+
+
+@compiled
+def to_first_force(c: Any, x: Floats, P: Floats, a: Sample) -> None:
     """Puts the mean on the line that a sample's force implies; its depth is kept."""
-    n = len(x)
-    K = exp(x[n - 1])
-    u, f = a[3:6], a[12:15]
-    depth = push = 0.0
-    for i in range(3):
-        depth += u[i] * (x[i] - a[i])
-        push += u[i] * f[i]
-    offset = (f - push * u) / K
-    side = (noise[0] / K) ** 2 + noise[4] ** 2
-    sigma2 = P[n - 1, n - 1]
-    x[0:3] = a[0:3] + depth * u + offset
+    K = exp(x[LN_K])
+    depth = dot(a.u, sub(xyz(x, 0), a.p))
+    offset = over(across(a.f, a.u), K)
+    side = (c.force_noise / K) ** 2 + c.pose_noise**2
+    sigma2 = P[LN_K, LN_K]
+    x[0:3] = plus(along(a.p, depth, a.u), offset)
     P[0:3, :] = 0.0
     P[:, 0:3] = 0.0
     for i in range(3):
         for j in range(3):
             # An unknown stiffness leaves the offset along the force unknown with it.
-            P[i, j] = (guess_sigma**2 - side) * u[i] * u[j]
+            P[i, j] = (c.guess_sigma**2 - side) * a.u[i] * a.u[j]
             P[i, j] += sigma2 * offset[i] * offset[j]
         P[i, i] += side
-        P[i, n - 1] = P[n - 1, i] = -sigma2 * offset[i]
+        P[i, LN_K] = P[LN_K, i] = -sigma2 * offset[i]
 
 
 @compiled
-def follow_jump(
-    x: Floats, P: Floats, a: Floats, noise: Floats, depth_above: float, size: float
-) -> None:
+def follow_jump(c: Any, x: Floats, P: Floats, a: Sample, size: float) -> None:
     """The wall has jumped by about `size` m: fits the mean alone, iterated."""
     for i in range(3):
         P[i, i] += size**2
     prior = x[0:3].copy()
     for _ in range(4):
-        y, H, S, HP, gain, _, _, _ = innovate(x, P, a, noise, depth_above)
+        seen = innovate(c, x, P, a)
         # The innovation seen from the prior, linearised at the iterate.
         for j in range(4):
             for i in range(3):
-                y[j] += H[j, i] * (x[i] - prior[i])
+                seen.y[j] += seen.H[j, i] * (x[i] - prior[i])
         for i in range(3):
             x[i] = prior[i]
             for j in range(4):
-                x[i] += gain[i, j] * y[j]
+                x[i] += seen.gain[i, j] * seen.y[j]
     x[0:3] = prior
-    update(x, P, y, S, HP, gain, a[3:6], 1.0, 3)
+    update(x, P, seen, a.u, 1.0, 3)
 
 
 @compiled
-def sample_at(shaft: Floats, wrench: Floats, c) -> Floats:  # type: ignore[no-untyped-def]
+def sample_at(c: Any, shaft: ShaftMotion, wrench: Wrench) -> Sample:
     """A reading as a sample; its angle counts while the tip moves across the shaft."""
-    a = np.empty(21)
-    a[0:12] = shaft
-    a[12:18] = wrench[0:6]
-    a[18], a[19] = c.damping, 1.0
-    v = shaft[6:9] + c.length * shaft[9:12]
-    along = v[0] * shaft[3] + v[1] * shaft[4] + v[2] * shaft[5]
-    speed2 = v[0] ** 2 + v[1] ** 2 + v[2] ** 2 - along**2
-    speed = sqrt(max(speed2, 0.0))
-    a[20] = min(max(speed / c.depth_speed - 1.0, 0.0), 1.0)
-    return a
+    tip = along(shaft.v, c.length, shaft.du)
+    lengthwise = dot(tip, shaft.u)
+    speed = sqrt(max(dot(tip, tip) - lengthwise**2, 0.0))
+    turning = min(max(speed / c.depth_speed - 1.0, 0.0), 1.0)
+    p, u, v, du = shaft
+    return Sample(p, u, v, du, wrench.f, wrench.m, c.damping, 1.0, turning)
 
 
 @compiled
-def report(packed: Floats, z: Floats, u: Floats, time: float) -> Floats:
-    """The estimate at a time (14).
+def uncertainty(packed: Floats, z: Floats) -> Floats:
+    """The elements of the `Covariance` at the last update."""
+    m = memory(packed, z)
+    bias = 0.5 * packed[0].force_bias / exp(m.x[LN_K])
+    return covariance(m.P, bias).reshape(-1)
 
-    p_WI and v_WI; sigma across the shaft u and along it; stiffness and sigma of its
-    logarithm; breathing rate; phase, jumps followed, estimates refused.
+
+@compiled
+def report(packed: Floats, z: Floats, time: float, shaft_now: Floats) -> Floats:
+    """The elements of the `Fulcrum` at a time.
+
+    Args:
+        packed: Of `constants`.
+        z: State.
+        time: In s.
+        shaft_now: Elements of the `ShaftMotion`.
     """
     c = packed[0]
-    n = 5 + 6 * int(c.harmonics)
-    i_record = n + n * n
-    aux = z[i_record + (RECORD + 1) * WIDTH :]
-    x, P = z[:n], z[n:i_record].reshape(n, n)
-    omega, K = exp(x[n - 2]), exp(x[n - 1])
-    ahead = max(0.0, time - aux[_TIME]) + c.latency
-    r = np.empty(14)
-    for j in range(3):
-        r[j], r[3 + j] = x[j], 0.0
-        for k in range(int(c.harmonics)):
-            w = (k + 1) * omega
-            co, si = cos(w * ahead), sin(w * ahead)
-            a, b = x[3 + 6 * k + j], x[6 + 6 * k + j]
-            r[j] += a * co - b * si
-            r[3 + j] -= w * (a * si + b * co)
-    r[6], r[7] = spread(P, u, 0.5 * c.force_bias / K)
-    r[8], r[9] = K, sqrt(P[n - 1, n - 1])
-    seen = aux[_PHASE] == BREATHING and aux[len(AUX)] >= LEAST_BREATHING
-    r[10] = omega / (2.0 * pi) if seen else 0.0
-    r[11], r[12], r[13] = aux[_PHASE], aux[_JUMPS], aux[_REFUSED]
-    return r
+    shaft = read_shaft(shaft_now)
+    m = memory(packed, z)
+    x, P, scalars = m.x, m.P, m.scalars
+    omega, K = exp(x[LN_OMEGA]), exp(x[LN_K])
+    ahead = max(0.0, time - scalars[TIME]) + c.latency
+    p, v = xyz(x, 0), (0.0, 0.0, 0.0)
+    for k in range(len(m.rms)):
+        w = (k + 1) * omega
+        co, si = cos(w * ahead), sin(w * ahead)
+        a, b = xyz(x, 3 + 6 * k), xyz(x, 6 + 6 * k)
+        p = plus(p, along(scaled(co, a), -si, b))
+        v = along(v, -w, along(scaled(si, a), co, b))
+    sigma_across, sigma_along = spread(P, shaft.u, 0.5 * c.force_bias / K)
+    seen = scalars[PHASE] == BREATHING and m.rms[0] >= LEAST_BREATHING
+    fulcrum = Fulcrum(
+        p,
+        v,
+        sigma_across,
+        sigma_along,
+        K,
+        sqrt(P[LN_K, LN_K]),
+        omega / (2.0 * pi) if seen else 0.0,
+        scalars[PHASE],
+        scalars[JUMPS],
+        scalars[REFUSED],
+    )
+    return write_fulcrum(fulcrum)
 
 
 @compiled
 def advance(
-    packed: Floats, old: Floats, shaft: Floats, wrench: Floats, time: float
+    packed: Floats, old: Floats, time: float, shaft_now: Floats, wrench_now: Floats
 ) -> Floats:
     """The tracker's next state.
 
     Args:
-        packed: `FulcrumParams`, with `every`: samples in an entry of the record.
+        packed: Of `constants`.
         old: State z.
-        shaft: p_WS, u, v_WS, du (12).
-        wrench: f, m, and 1 if they are valid (7).
         time: In s.
+        shaft_now: Elements of the `ShaftMotion`.
+        wrench_now: Elements of the `Wrench`.
     """
     c = packed[0]
-    n = 5 + 6 * int(c.harmonics)
-    i_record = n + n * n
-    i_sums = i_record + RECORD * WIDTH
-    i_aux = i_sums + WIDTH
-    i_parts = i_aux + len(AUX)
+    n = c.n
     z = old.copy()
-    x, P = z[:n], z[n:i_record].reshape(n, n)
-    sums, aux = z[i_sums:i_aux], z[i_aux:i_parts]
-    parts = c.amplitude_walk * np.maximum(z[i_parts:], 3e-4)
-    noise = np.array(
-        (c.force_noise, c.moment_noise, c.force_bias, c.moment_bias, c.pose_noise)
-    )
-    aux[_TIME], aux[_DUE] = time, 0.0
-    known = aux[_PHASE] == BREATHING
-    walk = aux[_WALK] * min(max(aux[_NIS], 1.0), 10.0) if known else c.wall_walk
-    valid = wrench[6] > 0.5 and np.isfinite(wrench).all() and np.isfinite(shaft).all()
-    if not valid:
-        if aux[_PHASE] != BEFORE:
+    x, P, record, sums, aux, rms = memory(packed, z)
+    shaft, wrench = read_shaft(shaft_now), read_wrench(wrench_now)
+    parts = c.amplitude_walk * np.maximum(rms, LEAST_RMS)
+    aux[TIME], aux[DUE] = time, 0.0
+    known = aux[PHASE] == BREATHING
+    walk = aux[WALK] * min(max(aux[NIS], 1.0), 10.0) if known else c.wall_walk
+    if not (wrench.valid > 0.5 and finite_wrench(wrench) and finite_shaft(shaft)):
+        if aux[PHASE] != BEFORE:
             predict(x, P, c.period, walk, parts, known)
-            aux[_RECORDED] = aux[_SUMMED] = 0.0  # a record must have no gaps
+            aux[RECORDED] = aux[SUMMED] = 0.0  # a record must have no gaps
             sums[:] = 0.0
         return z
-    a = sample_at(shaft, wrench, c)
-    u, f = shaft[3:6], wrench[0:3]
-    push = f[0] * u[0] + f[1] * u[1] + f[2] * u[2]
-    force = sqrt(max(f[0] ** 2 + f[1] ** 2 + f[2] ** 2 - push**2, 0.0))
-    aux[_FORCE] = force
-    aux[_STEPS] += 1.0
-    if aux[_PHASE] == BEFORE:
-        to_first_force(x, P, a, c.guess_sigma, noise)
-        aux[_PHASE] = FOLLOWING
+    a = sample_at(c, shaft, wrench)
+    force = sqrt(max(dot(a.f, a.f) - dot(a.f, a.u) ** 2, 0.0))
+    aux[STEPS] += 1.0
+    if aux[PHASE] == BEFORE:
+        to_first_force(c, x, P, a)
+        aux[PHASE] = FOLLOWING
         return z
-    guard = aux[_GUARD] > 0.0
+    guard = aux[GUARD] > 0.0
     if guard:
-        aux[_GUARD] -= c.period
+        aux[GUARD] -= c.period
         walk = _GUARD_WALK
     predict(x, P, c.period, walk, parts, known)
+    turning = a.turning
     if not known:
         # A wall that breathes unseen under a turning shaft looks like a depth error:
         # angles are heard only while the depth is hardly known at all.
-        sigma = spread(P, u, 0.0)[1]
-        a[20] *= min(max(sigma / _DEPTH_UNKNOWN - 1.0, 0.0), 1.0)
-    y, _, S, HP, gain, w, nis, seen = innovate(x, P, a, noise, c.depth_above)
-    if nis < 0.0:
+        sigma = spread(P, a.u, 0.0)[1]
+        turning *= min(max(sigma / _DEPTH_UNKNOWN - 1.0, 0.0), 1.0)
+    seen = innovate(c, x, P, a)
+    if seen.nis < 0.0:
         raise ValueError("fulcrum estimator: a covariance is not positive definite")
-    if nis > _JUMP_NIS and not guard:
-        aux[_UNLIKELY] += 1.0
-        if aux[_UNLIKELY] < 2.0:
+    if seen.nis > _JUMP_NIS and not guard:
+        aux[UNLIKELY] += 1.0
+        if aux[UNLIKELY] < 2.0:
             return z  # coasted over: one unlikely sample
-        size = 1.5 * sqrt(y[0] ** 2 + y[1] ** 2) / exp(x[n - 1])
-        follow_jump(x, P, a, noise, c.depth_above, min(_LARGEST_JUMP, size))
-        aux[_UNLIKELY], aux[_GUARD], aux[_RECORDED] = 0.0, _GUARD_TIME, 0.0
-        aux[_JUMPS] += 1.0
+        size = 1.5 * sqrt(seen.y[0] ** 2 + seen.y[1] ** 2) / exp(x[LN_K])
+        follow_jump(c, x, P, a, min(_LARGEST_JUMP, size))
+        aux[UNLIKELY], aux[GUARD], aux[RECORDED] = 0.0, _GUARD_TIME, 0.0
+        aux[JUMPS] += 1.0
     else:
-        aux[_UNLIKELY] = 0.0
-        aux[_NIS] += 0.02 * (min(nis, 60.0) / 4.0 - aux[_NIS])
+        aux[UNLIKELY] = 0.0
+        aux[NIS] += 0.02 * (min(seen.nis, 60.0) / 4.0 - aux[NIS])
         # Once the wall is understood, force is mostly what the prediction missed of
         # its motion, and says less of its stiffness.
         least = c.learn_above * (_UNDERSTOOD if known else 1.0)
         held = 3 if guard else (n if force > least else n - 1)
-        update(x, P, y, S, HP, gain, u, max(seen, a[20]), held)
-    add_to_record(sums, x, a, w)
-    aux[_SUMMED] += 1.0
-    if aux[_SUMMED] >= c.every:
-        z[i_record : i_sums - WIDTH] = z[i_record + WIDTH : i_sums].copy()
-        z[i_sums - WIDTH : i_sums] = sums / aux[_SUMMED]
-        sums[:], aux[_SUMMED] = 0.0, 0.0
-        aux[_RECORDED] = min(aux[_RECORDED] + 1.0, RECORD)
-        aux[_DUE] = 1.0
-    far = 0.0
-    for i in range(3):
-        p = x[i]
-        for k in range(3, n - 2, 6):
-            p += x[k + i]
-        far += (p - c.guess[i]) ** 2
-    if far > c.neighbourhood**2:  # refused: starts anew
-        aux[_REFUSED] += 1.0
-        aux[_PHASE], aux[_GUARD], aux[_RECORDED], aux[_AGREED] = (
-            FOLLOWING,
-            0.0,
-            0.0,
-            0.0,
-        )
+        update(x, P, seen, a.u, max(seen.seen, turning), held)
+    sums += write_entry(entry_of(x, a, turning, seen.w))
+    aux[SUMMED] += 1.0
+    if aux[SUMMED] >= c.every:
+        record[:-1] = record[1:].copy()
+        record[-1] = sums / aux[SUMMED]
+        sums[:], aux[SUMMED] = 0.0, 0.0
+        aux[RECORDED] = min(aux[RECORDED] + 1.0, RECORD)
+        aux[DUE] = 1.0
+    fulcrum = xyz(x, 0)
+    for k in range(3, n - 2, 6):
+        fulcrum = plus(fulcrum, xyz(x, k))
+    away = sub(fulcrum, c.guess)
+    if dot(away, away) > c.neighbourhood**2:  # refused: starts anew
+        aux[REFUSED] += 1.0
+        aux[PHASE] = FOLLOWING
+        aux[GUARD] = aux[RECORDED] = aux[AGREED] = 0.0
+        x[:LN_OMEGA] = 0.0
         x[0:3] = c.guess
-        x[3 : n - 2] = 0.0
-        own = P[n - 1, n - 1]
+        own = P[LN_K, LN_K]
         P[:] = 0.0
-        P[n - 1, n - 1] = own
-        to_first_force(x, P, a, c.guess_sigma, noise)
+        P[LN_K, LN_K] = own
+        to_first_force(c, x, P, a)
     return z

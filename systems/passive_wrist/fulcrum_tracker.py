@@ -20,113 +20,106 @@ from math import exp, log, pi, sqrt
 
 import numpy as np
 
-from systems.common.compiled import packed
+from systems.common.compiled import rehearse
+from systems.common.signal import example, flat, view
+from systems.common.signals import ShaftMotion, Wrench
 from systems.passive_wrist.breathing_rate import BreathingFit, find_breathing
-from systems.passive_wrist.fulcrum_filter import FulcrumFilter, FulcrumParams
-from systems.passive_wrist.fulcrum_kernels import sample_of, spread
+from systems.passive_wrist.fulcrum_filter import FulcrumParams, prior
+from systems.passive_wrist.fulcrum_kernels import (
+    LN_K,
+    LN_OMEGA,
+    RECORD_PERIOD,
+    Entry,
+    filter_record,
+    predict,
+    read_entry,
+    sample_of,
+)
 from systems.passive_wrist.fulcrum_step import (
-    AUX,
+    AGREED,
     BREATHING,
+    FOUND,
     LEAST_BREATHING,
+    LEAST_RMS,
+    NIS,
+    PHASE,
     RECORD,
-    WIDTH,
+    RECORDED,
+    SCALARS,
+    STEPS,
+    TIME,
+    WALK,
+    Memory,
     advance,
+    constants,
+    memory,
     report,
+    to_first_force,
+    uncertainty,
 )
 
-_RECORD_PERIOD = 0.1  # [s]
 _CHECK = 3  # entries between two looks for the breathing
 _SHORTEST = 28  # entries before the first look
 _STILL = 50  # entries without motion that make a still wall
 _EXPECTED = 1.5  # smoothed innovations up to which the wall is understood
-_DUE = AUX.index("due")
 
 
 class FulcrumTracker:
-    """The estimator over plain arrays; all it remembers is the vector `z`.
+    """The estimator over plain arrays; all it remembers is the vector z.
 
-    Layout of z: x (n), P (n n), the record (120 x 13: mean p_WS, u, f, m and weight
-    of the angle of a tenth of a second), the sums for its next entry (13), the
-    scalars `AUX`, and each harmonic's rms in m when the breathing was found.
-
-    The scalars: phase; steps so far; unlikely samples in a row; s of guard left after
-    a jump; nis, smoothed normalised innovation squared / 4 (1 = as expected); entries
-    recorded; looks in a row that agreed on a rate; the rate found, in Hz; jumps
-    followed; estimates refused; lateral force in N; walk of the mean once the wall is
-    understood, in m/sqrt(s); samples summed; time of the last update in s; 1 if an
-    entry was just added.
-
-    Attributes:
-        filter: Prediction and updates.
-        size: Length of z.
+    Its layout stands in `fulcrum_step`.
     """
 
     def __init__(self, params: FulcrumParams) -> None:
-        self.filter = FulcrumFilter(params)
         self.p = params
-        n = self.filter.n
-        self._record = n + n * n
-        self._sums = self._record + WIDTH * RECORD
-        self._aux = self._sums + WIDTH
-        self._parts = self._aux + len(AUX)
-        self.size = self._parts + params.harmonics
-        self._every = max(1, round(_RECORD_PERIOD / params.period))
-        self._constants = packed(params, every=float(self._every))
+        self._constants = constants(params)
+        self._c = self._constants[0]
+        self._every = float(self._c["every"])
+        self._due = self.at("due")
+        self._parts = [6 * k + 3 for k in range(params.harmonics)]
+        rehearse(self._call_all)
+
+    def _call_all(self) -> None:
+        """Calls every kernel once."""
+        shaft, wrench = example(ShaftMotion), example(Wrench)
+        entry = Entry(shaft.p, shaft.u, wrench.f, wrench.m, 1.0)
+        z = self.initial()
+        for _ in range(2):
+            z = self.step(z, flat(shaft), flat(wrench))
+        self._filter_again(z, np.tile(flat(entry), (2, 1)), None, 0.0)
+        self.report(z, 0.0, flat(shaft))
+        self.covariance(z)
 
     def initial(self) -> np.ndarray:
-        """The state before the first sample, shape (size,)."""
-        x, P = self.filter.prior()
-        z = np.zeros(self.size)
-        z[: self.filter.n], z[self.filter.n : self._record] = x, P.reshape(-1)
-        z[self.at("nis")], z[self.at("time")] = 1.0, -self.p.period
+        """The state before the first sample, shape (end,)."""
+        z = np.zeros(self._c["end"])
+        m = self.memory(z)
+        m.x[:], m.P[:] = prior(self.p)
+        m.scalars[NIS], m.scalars[TIME] = 1.0, -self.p.period
         return z
 
-    def at(self, name: str) -> int:
-        """Index in z of a scalar named in `AUX`."""
-        return self._aux + AUX.index(name)
+    def memory(self, z: np.ndarray) -> Memory:
+        """The parts of z; nothing is copied."""
+        return memory(self._constants, z)
 
-    def mean(self, z: np.ndarray) -> np.ndarray:
-        """The filter's state x, a view into z."""
-        return z[: self.filter.n]
+    def at(self, name: str) -> int:
+        """Index in z of a scalar named in `SCALARS`."""
+        return int(self._c["scalars"]) + SCALARS.index(name)
 
     def covariance(self, z: np.ndarray) -> np.ndarray:
-        """Covariance (3, 3) of the fulcrum at the last update, in m^2.
+        """Covariance (3, 3) of the fulcrum at the last update, row by row, in m^2."""
+        return uncertainty(self._constants, z)
 
-        The sensor's slow bias shifts the estimate sideways however long one
-        averages, so its share is added here.
-        """
-        n, total = self.filter.n, self.filter.total
-        P = total @ z[n : self._record].reshape(n, n) @ total.T
-        bias = self.p.force_bias * 0.5 / exp(z[n - 1])
-        P.reshape(-1)[::4] += bias**2
-        return P
-
-    def report(self, z: np.ndarray, u: np.ndarray, time: float) -> np.ndarray:
-        """The estimate as a vector (14); see `FulcrumEstimator`'s port."""
-        vector: np.ndarray = report(self._constants, z, u, time)
-        return vector
-
-    def spread(self, z: np.ndarray, u: np.ndarray) -> tuple[float, float]:
-        """Standard deviations of the fulcrum across a shaft and along it, in m."""
-        n = self.filter.n
-        bias = self.p.force_bias * 0.5 / exp(z[n - 1])
-        sigmas: tuple[float, float] = spread(z[n : self._record].reshape(n, n), u, bias)
-        return sigmas
-
-    def stiffness(self, z: np.ndarray) -> tuple[float, float]:
-        """Believed stiffness in N/m and the standard deviation of its logarithm."""
-        n = self.filter.n
-        return exp(z[n - 1]), sqrt(z[self._record - 1])
+    def report(self, z: np.ndarray, time: float, shaft: np.ndarray) -> np.ndarray:
+        """The elements of the `Fulcrum` at a time, of those of the `ShaftMotion`."""
+        return report(self._constants, z, time, shaft)
 
     def breathing(self, z: np.ndarray) -> float:
         """Rate in Hz; zero while there is no breathing to see."""
-        if z[self.at("phase")] < BREATHING or z[self._parts] < LEAST_BREATHING:
+        m = self.memory(z)
+        if m.scalars[PHASE] < BREATHING or m.rms[0] < LEAST_BREATHING:
             return 0.0
-        return exp(z[self.filter.n - 2]) / (2.0 * pi)
-
-    def ahead(self, z: np.ndarray, time: float) -> tuple[list[float], list[float]]:
-        """Fulcrum and its velocity `time` s after the last update."""
-        return self.filter.ahead(z[: self.filter.n], time)
+        return exp(m.x[LN_OMEGA]) / (2.0 * pi)
 
     def step(
         self, z: np.ndarray, shaft: np.ndarray, wrench: np.ndarray, time: float = 0.0
@@ -135,62 +128,63 @@ class FulcrumTracker:
 
         Args:
             z: The state.
-            shaft: p_WS [m], u, v_WS [m/s], du [1/s] (12).
-            wrench: f [N], m [N m], and 1 if they are valid (7).
+            shaft: Elements of the `ShaftMotion`.
+            wrench: Elements of the `Wrench`.
             time: In s.
         """
-        z = advance(self._constants, z, shaft, wrench, time)
-        aux = z[self._aux : self._parts]
-        third = aux[1] // self._every % _CHECK == 0
-        if aux[_DUE] == 1.0 and aux[5] >= _SHORTEST and third:
-            record = z[self._record : self._sums].reshape(RECORD, WIDTH)
-            self._look(z, record[RECORD - int(aux[5]) :])
+        z = advance(self._constants, z, time, shaft, wrench)
+        if z[self._due] == 1.0:
+            self._look(z)
         return z
 
-    def _part_walks(self, z: np.ndarray) -> np.ndarray:
-        return self.p.amplitude_walk * np.maximum(z[self._parts :], 3e-4)
-
-    def _look(self, z: np.ndarray, record: np.ndarray) -> None:
+    def _look(self, z: np.ndarray) -> None:
         """Looks for the breathing, or for a still wall, in the record."""
-        n, p, aux = self.filter.n, self.p, z[self._aux : self._parts]
-        x = z[:n]
-        stiffness = exp(x[n - 1])
-        p_WS, u, f = record[:, 0:3], record[:, 3:6], record[:, 6:9]
-        p_WI = self._where(x, len(record)) if aux[0] == BREATHING else x[:3]
-        depth = ((p_WI - p_WS) * u).sum(axis=1)
-        place = p_WS + depth[:, None] * u + f / stiffness
+        p, m = self.p, self.memory(z)
+        x, scalars = m.x, m.scalars
+        third = scalars[STEPS] // self._every % _CHECK == 0
+        if scalars[RECORDED] < _SHORTEST or not third:
+            return
+        record = m.record[RECORD - int(scalars[RECORDED]) :]
+        stiffness = exp(x[LN_K])
+        seen = view(Entry, record)
+        known = scalars[PHASE] == BREATHING
+        p_WI = self._where(x, len(record)) if known else x[:3]
+        depth = ((p_WI - seen.p) * seen.u).sum(axis=1)
+        place = seen.p + depth[:, None] * seen.u + seen.f / stiffness
         # Across the mean shaft: along it the filter's belief would confirm itself.
-        axis = u.mean(axis=0)
+        axis = seen.u.mean(axis=0)
         axis /= sqrt(axis.dot(axis))
         lateral = place - place.dot(axis)[:, None] * axis
         noise = p.force_noise / sqrt(self._every) / stiffness
-        fit = find_breathing(lateral, _RECORD_PERIOD, p.harmonics)
-        known = aux[0] == BREATHING
+        fit = find_breathing(lateral, RECORD_PERIOD, p.harmonics)
         if fit is None or not believable(fit, len(record), noise):
-            aux[6] = 0.0
+            scalars[AGREED] = 0.0
             moved = float(np.sqrt(lateral.var(axis=0).sum()))
             still = moved < max(2e-4, 3.0 * noise)
             if not known and len(record) >= _STILL and still:
                 self._filter_again(z, record, None, noise)
             return
-        agrees = abs(fit.rate / aux[7] - 1.0) < 0.06 if aux[7] > 0.0 else False
-        aux[6] = aux[6] + 1.0 if agrees else 1.0
-        aux[7] = fit.rate
+        before = scalars[FOUND]
+        agrees = abs(fit.rate / before - 1.0) < 0.06 if before > 0.0 else False
+        scalars[AGREED] = scalars[AGREED] + 1.0 if agrees else 1.0
+        scalars[FOUND] = fit.rate
         # Another rate than the one that is followed: the first may have been found
         # in less than a breath. It is taken when the record has long said so, or at
         # once when the wall is not understood.
-        other = abs(log(2.0 * pi * fit.rate) - x[n - 2]) > 0.04 or not self.breathing(z)
-        breaths = fit.rate * len(record) * _RECORD_PERIOD
-        certain = (aux[6] >= 4.0 and breaths > 1.3) or aux[4] > _EXPECTED
-        if aux[6] >= 2.0 and (not known or (other and certain)):
+        strange = abs(log(2.0 * pi * fit.rate) - x[LN_OMEGA]) > 0.04
+        other = strange or not self.breathing(z)
+        breaths = fit.rate * len(record) * RECORD_PERIOD
+        long_said = scalars[AGREED] >= 4.0 and breaths > 1.3
+        certain = long_said or scalars[NIS] > _EXPECTED
+        if scalars[AGREED] >= 2.0 and (not known or (other and certain)):
             self._filter_again(z, record, fit, noise)
 
     def _where(self, x: np.ndarray, entries: int) -> np.ndarray:
         """The fulcrum at the record's last entries, shape (entries, 3)."""
-        back = -_RECORD_PERIOD * (np.arange(entries)[::-1] + 0.5)
-        omega = exp(x[self.filter.n - 2])
+        back = -RECORD_PERIOD * (np.arange(entries)[::-1] + 0.5)
+        omega = exp(x[LN_OMEGA])
         place = np.tile(x[:3], (entries, 1))
-        for k, i in enumerate(self.filter.parts, 1):
+        for k, i in enumerate(self._parts, 1):
             phase = k * omega * back
             place += np.outer(np.cos(phase), x[i : i + 3])
             place -= np.outer(np.sin(phase), x[i + 3 : i + 6])
@@ -204,34 +198,34 @@ class FulcrumTracker:
         noise: float,
     ) -> None:
         """Filters the record again, now with the breathing's rate."""
-        f, p, n = self.filter, self.p, self.filter.n
-        aux = z[self._aux : self._parts]
-        x, P = f.prior()
-        old = z[n : self._record].reshape(n, n)
-        x[n - 1], P[n - 1, n - 1] = z[n - 1], old[n - 1, n - 1]
-        x[:3] = z[:3] if aux[0] == BREATHING else p.guess
-        x[n - 2] = log(2.0 * pi * (fit.rate if fit else 0.25))
-        P[n - 2, n - 2] = 0.05**2
-        f.to_first_force(x, P, sample_of(record[0], self._every))
-        u = record[0, 3:6]
+        p, m = self.p, self.memory(z)
+        x, P = prior(p)
+        x[LN_K], P[LN_K, LN_K] = m.x[LN_K], m.P[LN_K, LN_K]
+        x[:3] = m.x[:3] if m.scalars[PHASE] == BREATHING else p.guess
+        x[LN_OMEGA] = log(2.0 * pi * (fit.rate if fit else 0.25))
+        P[LN_OMEGA, LN_OMEGA] = 0.05**2
+        to_first_force(self._c, x, P, sample_of(read_entry(record[0]), self._every))
+        u = view(Entry, record[0]).u
         U = np.outer(u, u)
-        z[self._parts :] = fit.parts if fit else 0.0
-        for k, i in enumerate(f.parts):
-            side = (1.5 * z[self._parts + k]) ** 2 + 1e-8
-            spread = side * (np.eye(3) - U) + p.axial_ratio**2 * side * U
-            P[i : i + 3, i : i + 3] = P[i + 3 : i + 6, i + 3 : i + 6] = spread
-            P[:3, :3] += spread  # the first sample was taken somewhere in the wave
+        m.rms[:] = fit.parts if fit else 0.0
+        for i, rms in zip(self._parts, m.rms, strict=True):
+            side = (1.5 * rms) ** 2 + 1e-8
+            wide = side * (np.eye(3) - U) + p.axial_ratio**2 * side * U
+            P[i : i + 3, i : i + 3] = P[i + 3 : i + 6, i + 3 : i + 6] = wide
+            P[:3, :3] += wide  # the first sample was taken somewhere in the wave
         # What the harmonics miss of the wave, as a walk that wanders as far in the
         # time of the first harmonic left out.
         left = max(fit.residual**2 - 2.0 * noise**2, 0.0) if fit else 0.0
         omega = 2.0 * pi * (fit.rate if fit else 0.0) * (p.harmonics + 1)
-        aux[11] = sqrt(p.still_walk**2 + 2.0 * omega * left)
-        walks = self._part_walks(z)
-        f.filter_record(x, P, record, _RECORD_PERIOD, self._every, aux[11], walks)
+        walk = sqrt(p.still_walk**2 + 2.0 * omega * left)
+        walks = p.amplitude_walk * np.maximum(m.rms, LEAST_RMS)
+        if not filter_record(self._constants, x, P, record, walk, walks):
+            raise ValueError("fulcrum estimator: the record cannot be filtered again")
         # An entry is the mean of a tenth of a second: half of that old.
-        f.predict(x, P, 0.5 * _RECORD_PERIOD, 0.0, walks, True)
-        z[:n], z[n : self._record] = x, P.reshape(-1)
-        aux[0], aux[4], aux[6] = BREATHING, 1.0, 0.0
+        predict(x, P, 0.5 * RECORD_PERIOD, 0.0, walks, True)
+        m.x[:], m.P[:] = x, P
+        m.scalars[WALK] = walk
+        m.scalars[PHASE], m.scalars[NIS], m.scalars[AGREED] = BREATHING, 1.0, 0.0
 
 
 def believable(fit: BreathingFit, entries: int, noise: float) -> bool:
@@ -247,6 +241,6 @@ def believable(fit: BreathingFit, entries: int, noise: float) -> bool:
         return False
     if len(fit.parts) > 1 and fit.parts[1] > 0.8 * fit.parts[0]:
         return False  # half the rate: of a breath the first harmonic is the largest
-    breaths = fit.rate * entries * _RECORD_PERIOD
+    breaths = fit.rate * entries * RECORD_PERIOD
     # A sharp wave seen for less than a breath fits a quicker one nearly as well.
     return breaths > 1.3 or fit.residual < 0.04 * fit.amplitude + 1.5 * noise

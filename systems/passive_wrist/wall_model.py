@@ -10,19 +10,17 @@ perpendicular from I, so the contact lies at p_C = p_S + lambda u with
 
 Only the four lateral components carry information. With a lateral basis e1, e2
 = u x e1 they are z = (f1, f2, m1, m2) with m1 = -lambda f2, m2 = lambda f1.
-Everything here is in plain floats: it runs at every control step.
 """
 
-from collections.abc import Sequence
 from math import sqrt
 
-import numpy as np
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import cross
+from systems.common.signal import Vector
 
-type Vector = Sequence[float] | np.ndarray
-type Triple = tuple[float, float, float]
 
-
-def lateral_basis(u: Vector) -> tuple[Triple, Triple]:
+@compiled
+def lateral_basis(u: Numbers) -> tuple[Vector, Vector]:
     """Two unit vectors e1, e2 = u x e1 across a unit vector u (3)."""
     x, y, z = u[0], u[1], u[2]
     if abs(x) < 0.8:  # across the world's x axis, unless u is close to it
@@ -31,10 +29,4 @@ def lateral_basis(u: Vector) -> tuple[Triple, Triple]:
     else:
         n = sqrt(x * x + z * z)
         e1 = (-z / n, 0.0, x / n)
-    a, b, c = e1
-    return e1, (y * c - z * b, z * a - x * c, x * b - y * a)
-
-
-def dot(a: Vector, b: Vector) -> float:
-    """The inner product of two 3-vectors."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return e1, cross(u, e1)

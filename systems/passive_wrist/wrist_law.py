@@ -19,17 +19,45 @@ Around it lie three guards, all kept in one small state vector:
 
 from dataclasses import dataclass
 from math import exp, hypot, pi, sqrt
+from typing import Any
 
 import numpy as np
 
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import dot, norm, sub, xyz
+from systems.common.geometry import (
+    across,
+    along,
+    dot,
+    limited,
+    norm,
+    over,
+    plus,
+    scaled,
+    sub,
+    xyz,
+)
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import Vector, finiteness
+from systems.common.signals import (
+    Fulcrum,
+    MovingPoint,
+    Permission,
+    ShaftMotion,
+    ToolMotion,
+    Velocity,
+    Wrench,
+)
+from systems.common.stops import Stop
 from systems.passive_wrist.wall_model import lateral_basis
 
 MODES = ("pwe", "spring", "off", "known")
 PROBE_OFF, PROBE_ON, PROBE_BACK = 0.0, 1.0, 2.0
+PIVOT = 0  # p_W (3)
+TURN = 3  # its velocity (3)
+TIP = 6  # commanded p_WP (3)
+SPRING = 9  # filtered offset of the spring (3)
 STARTED = 12  # 1 once the law has begun
-FROZEN = 13  # 1 for force, 2 for a lost sensor
+FROZEN = 13  # the `Stop` of a frozen task, else 0
 OVER = 14  # s over the force limit
 CALM = 15  # s under the release force with a live sensor
 SILENT = 16  # s without a live sensor
@@ -42,96 +70,82 @@ DONE = 22  # 1 once the probe is over
 FREEZES = 23  # so far
 SCALE = 24  # share of the task's speed
 TIME = 25  # of the last update, in s
+SIZE = 26  # of the law's state
 
 
 @dataclass
 class WristParams:
-    """How the wrist is emulated.
+    """How the wrist is emulated."""
 
-    Attributes:
-        mode: `pwe` (estimated fulcrum), `spring` (the printed law: the first
-            guess corrected by force over a fixed stiffness), `off` (the first
-            guess for ever) or `known` (told the true fulcrum).
-        guess: First guess of the fulcrum p_WI, in m; used by `spring` and `off`.
-        spring_stiffness: Fixed stiffness of `spring`, in N/m.
-        spring_bandwidth: Its low-pass filter, in Hz.
-        horizon: How far ahead the fulcrum is predicted, in s: the lag between
-            this command and the arm's motion.
-        wrist_speed: Limit of the relaxing motion at the sensor, in m/s.
-        wrist_acceleration: In m/s^2.
-        probe: Whether the probing move is made when the stiffness is unknown.
-        probe_force: Its force limit, in N.
-        probe_travel: Its limit of travel at the fulcrum, in m.
-        probe_speed: At the fulcrum, in m/s.
-        probe_force_rate: Bound on its speed times the believed stiffness, in N/s.
-        probe_time: It ends after this time at the latest, in s.
-        warning_force: Lateral force that is reported, in N.
-        force_limit: Lateral force that freezes the task, in N.
-        force_limit_time: If it lasts this long, in s.
-        release_force: The task goes on below this force, in N ...
-        release_time: ... if that lasts this long, in s.
-        sensor_timeout: A sensor silent or saturated for this long freezes, in s.
-        sure_across: Lateral sigma up to which the task keeps full speed, in m.
-        sure_along: The same along the shaft, in m.
-        slowest: Smallest speed scale while the task moves.
-        period: Of the updates, in s.
-    """
+    # `pwe` (estimated fulcrum), `spring` (the printed law: the first guess corrected
+    # by force over a fixed stiffness), `off` (the first guess for ever), or `known`
+    # (told the true fulcrum).
+    mode: str = parameter("pwe", "what fulcrum it turns about", choices=MODES)
+    guess: list[float] | None = parameter(
+        None, "first one of p_WI, of spring and off", "m", least=-1, most=1, shape=(3,)
+    )
+    spring_stiffness: float = parameter(
+        2000.0, "of spring; 100 to 3000 is usual of a wall", "N/m", least=10, most=2e4
+    )
+    spring_bandwidth: float = parameter(
+        5.0, "of spring's low-pass filter", "Hz", above=0, most=60
+    )
+    # The lag between this command and the arm's motion.
+    horizon: float = parameter(
+        0.0, "how far ahead the fulcrum is predicted", "s", least=0, most=0.5
+    )
+    # Of the relaxing motion, at the sensor.
+    wrist_speed: float = parameter(0.25, "at the most", "m/s", above=0, most=1)
+    wrist_acceleration: float = parameter(5.0, "at the most", "m/s^2", above=0, most=50)
+    probe: bool = parameter(True, "whether an unknown stiffness is probed")
+    probe_force: float = parameter(1.0, "at the most", "N", above=0, most=5)
+    probe_travel: float = parameter(
+        0.012, "at the most, at the fulcrum", "m", above=0, most=0.03
+    )
+    probe_speed: float = parameter(0.03, "at the fulcrum", "m/s", above=0, most=0.2)
+    probe_force_rate: float = parameter(
+        15.0, "its speed times the believed stiffness", "N/s", above=0, most=100
+    )
+    probe_time: float = parameter(1.5, "at the most", "s", above=0, most=10)
+    # Of the lateral force.
+    warning_force: float = parameter(3.0, "that is reported", "N", above=0, most=50)
+    force_limit: float = parameter(5.0, "that freezes the task", "N", above=0, most=50)
+    force_limit_time: float = parameter(
+        0.3, "if it lasts so long", "s", above=0, most=2
+    )
+    release_force: float = parameter(
+        1.0, "below which the task goes on", "N", above=0, most=20
+    )
+    release_time: float = parameter(0.2, "if that lasts so long", "s", above=0, most=5)
+    sensor_timeout: float = parameter(
+        0.05, "silence of the sensor that freezes the task", "s", least=0, most=0.5
+    )
+    # Up to which the task keeps its full speed.
+    sure_across: float = parameter(1e-3, "lateral sigma", "m", above=0, most=0.02)
+    sure_along: float = parameter(5e-3, "sigma along", "m", above=0, most=0.05)
+    slowest: float = parameter(
+        0.25, "smallest speed scale while the task moves", least=0, most=1
+    )
+    period: float = parameter(1 / 120, "of the update", "s", above=0, most=0.1)
 
-    mode: str = "pwe"
-    guess: list[float] | None = None
-    spring_stiffness: float = 2000.0
-    spring_bandwidth: float = 5.0
-    horizon: float = 0.0
-    wrist_speed: float = 0.25
-    wrist_acceleration: float = 5.0
-    probe: bool = True
-    probe_force: float = 1.0
-    probe_travel: float = 0.012
-    probe_speed: float = 0.03
-    probe_force_rate: float = 15.0
-    probe_time: float = 1.5
-    warning_force: float = 3.0
-    force_limit: float = 5.0
-    force_limit_time: float = 0.3
-    release_force: float = 1.0
-    release_time: float = 0.2
-    sensor_timeout: float = 0.05
-    sure_across: float = 1e-3
-    sure_along: float = 5e-3
-    slowest: float = 0.25
-    period: float = 1.0 / 120.0
-
-    def check(self) -> None:
-        """Raises ValueError naming the first field that makes no sense."""
-        if self.mode not in MODES:
-            raise ValueError(
-                f"passive wrist: mode={self.mode!r} is unknown; "
-                f"choose one of {', '.join(MODES)}"
-            )
-        for name, value in vars(self).items():
-            if name in ("mode", "guess", "probe"):
-                continue
-            zero_ok = name in ("horizon", "slowest", "sensor_timeout")
-            if not (value > 0.0 or (zero_ok and value == 0.0)):
-                raise ValueError(f"passive wrist: {name}={value} must be > 0")
-        if not 10.0 <= self.spring_stiffness <= 2e4:
-            raise ValueError(
-                f"passive wrist: spring_stiffness={self.spring_stiffness} N/m is no "
-                "abdominal wall's; expected 10 to 20000 (100 to 3000 is usual)"
-            )
-        if self.guess is not None and len(self.guess) != 3:
-            raise ValueError(
-                f"passive wrist: guess={self.guess} must be 3 numbers in m"
-            )
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        below = f"at most force_limit, {self.force_limit} N"
+        yield self.release_force <= self.force_limit, "release_force", below
+        yield self.probe_force <= self.force_limit, "probe_force", below
 
 
-SIZE = 26
-"""Length of the law's state: pivot (3), its velocity (3), commanded tip (3), filtered
-spring offset (3), the scalars whose places are named above, and the time."""
-
-_basis = compiled(lateral_basis)
-_PWE, _SPRING, _OFF, _KNOWN = range(4)  # places in MODES
+_PWE, _SPRING, _OFF, _KNOWN = range(len(MODES))
+_LOADED, _SENSOR_LOST = float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST)
+_PROBING = float(Stop.PROBING)
+_STILL = (0.0, 0.0, 0.0)
 Floats = np.ndarray
+finite_fulcrum = finiteness(Fulcrum)
+finite_motion = finiteness(ToolMotion)
+finite_point = finiteness(MovingPoint)
+finite_shaft = finiteness(ShaftMotion)
+finite_velocity = finiteness(Velocity)
+finite_wrench = finiteness(Wrench)
 
 
 def initial(params: WristParams) -> np.ndarray:
@@ -142,18 +156,20 @@ def initial(params: WristParams) -> np.ndarray:
 
 
 def constants(params: WristParams) -> np.ndarray:
-    """The parameters as the compiled law takes them.
-
-    Raises:
-        ValueError: If one of them makes no sense.
-    """
-    params.check()
+    """The parameters as the compiled law takes them."""
+    check(params, "passive_wrist")
     first = np.array(params.guess or [0.0, 0.0, 0.0])
     return packed(params, code=float(MODES.index(params.mode)), first=first)
 
 
 @compiled
-def _watch(s: Floats, c, force: float, valid: bool) -> None:  # type: ignore[no-untyped-def]
+def _put(s: Floats, place: int, a: Vector) -> None:
+    """Writes a vector into the state."""
+    s[place], s[place + 1], s[place + 2] = a
+
+
+@compiled
+def _watch(s: Floats, c: Any, force: float, valid: bool) -> None:
     """Freezes and releases the task."""
     dt = c.period
     s[OVER] = s[OVER] + dt if valid and force > c.force_limit else 0.0
@@ -163,40 +179,40 @@ def _watch(s: Floats, c, force: float, valid: bool) -> None:  # type: ignore[no-
         if s[CALM] >= c.release_time:
             s[FROZEN] = 0.0
     elif s[OVER] >= c.force_limit_time:
-        s[FROZEN] = 1.0
+        s[FROZEN] = _LOADED
         s[FREEZES] += 1.0
     elif s[SILENT] > c.sensor_timeout:
-        s[FROZEN] = 2.0
+        s[FROZEN] = _SENSOR_LOST
         s[FREEZES] += 1.0
 
 
 @compiled
-def _spring(s: Floats, c, shaft: Floats, f: Floats, valid: bool) -> Floats:  # type: ignore[no-untyped-def]
+def _spring(s: Floats, c: Any, shaft: ShaftMotion, f: Vector, valid: bool) -> Vector:
     """The printed law: the first guess's depth, the force over a fixed stiffness."""
-    u = shaft[3:6]
     share = 1.0 - exp(-2.0 * pi * c.spring_bandwidth * c.period) if valid else 0.0
-    push = f[0] * u[0] + f[1] * u[1] + f[2] * u[2]
-    depth = 0.0
-    for k in range(3):
-        offset = (f[k] - push * u[k]) / c.spring_stiffness
-        s[9 + k] += share * (offset - s[9 + k])
-        depth += u[k] * (c.first[k] - shaft[k])
-    return shaft[0:3] + depth * u + s[9:12]
+    before = xyz(s, SPRING)
+    offset = over(across(f, shaft.u), c.spring_stiffness)
+    _put(s, SPRING, along(before, share, sub(offset, before)))
+    depth = dot(shaft.u, sub(c.first, shaft.p))
+    return plus(along(shaft.p, depth, shaft.u), xyz(s, SPRING))
 
 
 @compiled
-def _probe(s: Floats, c, u: Floats, f: Floats, estimate: Floats):  # type: ignore[no-untyped-def]
+def _probe(
+    s: Floats, c: Any, u: Vector, f: Vector, estimate: Fulcrum
+) -> tuple[Vector, Vector]:
     """The probing move: what it adds to the pivot and to its velocity."""
     dt = c.period
+    unsure = estimate.sigma_ln_stiffness
     if s[PROBE] == PROBE_OFF:
-        s[PROBE] = PROBE_ON if estimate[9] > 0.3 else PROBE_BACK
+        s[PROBE] = PROBE_ON if unsure > 0.3 else PROBE_BACK
     s[PROBED] += dt
-    if (estimate[9] < 0.15 and estimate[7] < 1.5e-3) or s[PROBED] > c.probe_time:
+    if (unsure < 0.15 and estimate.sigma_along < 1.5e-3) or s[PROBED] > c.probe_time:
         s[PROBE] = PROBE_BACK
-    e, _ = _basis(u)
-    speed = min(c.probe_speed, c.probe_force_rate / estimate[8])
+    e, _ = lateral_basis(u)
+    speed = min(c.probe_speed, c.probe_force_rate / estimate.stiffness)
     offset, way, move = s[OFFSET], s[WAY], 0.0
-    back = -(f[0] * e[0] + f[1] * e[1] + f[2] * e[2])
+    back = -dot(f, e)
     if s[PROBE] == PROBE_BACK:
         move = max(-speed * dt, min(speed * dt, -offset))
         if offset + move == 0.0:
@@ -208,12 +224,13 @@ def _probe(s: Floats, c, u: Floats, f: Floats, estimate: Floats):  # type: ignor
     else:
         move = way * speed * dt
     s[OFFSET] = offset + move
-    side = np.array(e)
-    return s[OFFSET] * side, move / dt * side
+    return scaled(s[OFFSET], e), scaled(move / dt, e)
 
 
 @compiled
-def _move_pivot(s: Floats, c, target: Floats, velocity: Floats, ratio: float) -> None:  # type: ignore[no-untyped-def]
+def _move_pivot(
+    s: Floats, c: Any, target: Vector, velocity: Vector, ratio: float
+) -> None:
     """Moves the pivot to its target within the wrist's limits.
 
     What is fed forward is the target's own velocity: a difference of two estimates
@@ -222,108 +239,108 @@ def _move_pivot(s: Floats, c, target: Floats, velocity: Floats, ratio: float) ->
     """
     dt = c.period
     fastest, hardest = c.wrist_speed * ratio, c.wrist_acceleration * ratio
-    error = sub(xyz(target, 0), xyz(s, 0))
-    over = (
-        error[0] / dt - velocity[0],
-        error[1] / dt - velocity[1],
-        error[2] / dt - velocity[2],
-    )
-    excess = norm(over)
+    error = sub(target, xyz(s, PIVOT))
+    more = sub(over(error, dt), velocity)
+    excess = norm(more)
     if excess <= max(hardest * dt, 0.2 * fastest):  # keeps up
-        s[0:3], s[3:6] = target, velocity
+        _put(s, PIVOT, target)
+        _put(s, TURN, velocity)
         return
     # Approaches no faster than it can brake, than the wrist may move, and than it
     # can speed up.
     share = min(1.0, sqrt(2.0 * hardest * norm(error)) / excess)
-    wanted = velocity + share * np.array(over)
-    speed = norm(xyz(wanted, 0))
-    if speed > fastest:
-        wanted = wanted * (fastest / speed)
-    change = wanted - s[3:6]
-    size = norm(xyz(change, 0))
-    s[3:6] += min(1.0, hardest * dt / max(size, 1e-12)) * change
-    s[0:3] += s[3:6] * dt
+    wanted = limited(along(velocity, share, more), fastest)
+    change = sub(wanted, xyz(s, TURN))
+    share = min(1.0, hardest * dt / max(norm(change), 1e-12))
+    _put(s, TURN, along(xyz(s, TURN), share, change))
+    _put(s, PIVOT, along(xyz(s, PIVOT), dt, xyz(s, TURN)))
 
 
 @compiled
 def next_state(
-    law: Floats,
+    c: Any,
     old: Floats,
-    tool: Floats,
-    shaft: Floats,
-    wrench: Floats,
-    estimate: Floats,
-    truth: Floats,
     time: float,
+    wanted: ToolMotion,
+    shaft: ShaftMotion,
+    wrench: Wrench,
+    estimate: Fulcrum,
+    seen: MovingPoint,
 ) -> Floats:
-    """The law's next state.
+    """The law's next state; what is not a number counts as a sensor that is silent.
 
     Args:
-        law: What `constants` returns.
-        old: State (26).
-        tool: The task's p_WP, u, v_WP, du and their time (13).
-        shaft: p_WS, u, v_WS, du (12).
-        wrench: f, m, and 1 if they are valid (7).
-        estimate: As the fulcrum estimator emits it (14).
-        truth: The true p_WI and v_WI (6), for `known`.
+        c: A record of `constants`.
+        old: State (26), its places named above.
         time: In s.
+        wanted: The task's tool.
+        shaft: As the encoders have it.
+        wrench: What the wall does to it.
+        estimate: What the fulcrum estimator says.
+        seen: The fulcrum that is believed in: the estimate's, or the true one.
     """
-    c = law[0]
     s = old.copy()
     s[TIME] = time
-    p_WP, v_WP = s[6:9].copy(), np.zeros(3)  # hold still without a number
-    if np.isfinite(tool).all():
-        p_WP, v_WP = tool[0:3] + (time - tool[12]) * tool[6:9], tool[6:9].copy()
-    valid = bool(wrench[6] > 0.5 and np.isfinite(wrench).all())
-    u, f = shaft[3:6], wrench[0:3] if valid else np.zeros(3)
-    push = dot(xyz(f, 0), xyz(u, 0))
-    force = sqrt(max(dot(xyz(f, 0), xyz(f, 0)) - push**2, 0.0))
+    p_WP, v_WP = xyz(s, TIP), _STILL  # hold still without a number
+    if finite_motion(wanted):
+        p_WP, v_WP = along(wanted.tip, time - wanted.time, wanted.v), wanted.v
+    is_told = finite_shaft(shaft) and finite_fulcrum(estimate) and finite_point(seen)
+    valid = is_told and wrench.valid > 0.5 and finite_wrench(wrench)
+    u, f = shaft.u, wrench.f if valid else _STILL
+    force = sqrt(max(dot(f, f) - dot(f, u) ** 2, 0.0)) if valid else 0.0
     _watch(s, c, force, valid)
-    seen = truth if c.code == _KNOWN else estimate
-    target, velocity = seen[0:3] + c.horizon * seen[3:6], seen[3:6].copy()
-    if c.code == _OFF or c.code == _SPRING:
-        velocity[:] = 0.0
-        if c.code == _OFF:
-            target[:] = c.first
-        else:
-            target[:] = _spring(s, c, shaft, f, valid)
-    if c.code == _PWE and c.probe and s[DONE] == 0.0 and valid:
+    target, velocity = along(seen.p, c.horizon, seen.v), seen.v
+    if not is_told:
+        target, velocity = xyz(s, PIVOT), _STILL
+    elif c.code == _OFF:
+        target, velocity = xyz(c.first, 0), _STILL
+    elif c.code == _SPRING:
+        target, velocity = _spring(s, c, shaft, f, valid), _STILL
+    elif c.code == _PWE and c.probe and s[DONE] == 0.0 and valid:
         more, faster = _probe(s, c, u, f, estimate)
-        target, velocity = target + more, velocity + faster
+        target, velocity = plus(target, more), plus(velocity, faster)
     if s[STARTED] == 0.0:
-        s[0:3], s[3:6], s[6:9], s[STARTED] = target, velocity, p_WP, 1.0
+        s[STARTED] = 1.0
+        _put(s, PIVOT, target)
+        _put(s, TURN, velocity)
+        _put(s, TIP, p_WP)
     else:
-        reach = norm(sub(xyz(p_WP, 0), xyz(s, 0)))
-        length = norm(sub(xyz(p_WP, 0), xyz(shaft, 0)))
+        reach = norm(sub(p_WP, xyz(s, PIVOT)))
+        length = norm(sub(p_WP, shaft.p)) if is_told else reach
         ratio = max(reach / max(length, 1e-3), 0.1)
         _move_pivot(s, c, target, velocity, ratio)
     if s[FROZEN] == 0.0:
         # The tip goes back to its task no faster than the wrist may move.
-        away = p_WP - s[6:9]
-        far = norm(xyz(away, 0))
-        step = (norm(xyz(v_WP, 0)) * 1.5 + 0.2 * c.wrist_speed) * c.period
-        s[6:9] += (1.0 if far <= step else step / far) * away
+        step = (norm(v_WP) * 1.5 + 0.2 * c.wrist_speed) * c.period
+        tip = xyz(s, TIP)
+        _put(s, TIP, plus(tip, limited(sub(p_WP, tip), step)))
     probing = s[PROBE] != PROBE_OFF and s[DONE] == 0.0
     s[SCALE] = 1.0
-    if s[FROZEN] != 0.0 or (c.code == _PWE and probing):
+    if s[FROZEN] != 0.0 or not is_told or (c.code == _PWE and probing):
         s[SCALE] = 0.0
     elif c.code == _PWE:
-        doubt = hypot(estimate[6] / c.sure_across, estimate[7] / c.sure_along)
+        across_it = estimate.sigma_across / c.sure_across
+        doubt = hypot(across_it, estimate.sigma_along / c.sure_along)
         s[SCALE] = max(c.slowest, 1.0 / max(doubt, 1.0))
     return s
 
 
 @compiled
-def command(s: Floats, tool: Floats) -> Floats:
-    """Desired instrument: p_WP, u_W, v_WP, du_W, and the time they hold at (13)."""
-    v = tool[6:9].copy()
-    if s[FROZEN] != 0.0 or not np.isfinite(v).all():
-        v[:] = 0.0
-    away = s[6:9] - s[0:3]
-    reach = norm(xyz(away, 0))
-    u = away / reach
-    turn = v - s[3:6]
-    out = np.empty(13)
-    out[0:3], out[3:6], out[6:9], out[12] = s[6:9], u, v, s[TIME]
-    out[9:12] = (turn - dot(xyz(turn, 0), xyz(u, 0)) * u) / reach
-    return out
+def command(s: Floats, wanted: ToolMotion) -> ToolMotion:
+    """The instrument that a state of the law commands, for the task's tool."""
+    still = s[FROZEN] != 0.0 or not finite_velocity(Velocity(wanted.v))
+    v = _STILL if still else wanted.v
+    tip = xyz(s, TIP)
+    away = sub(tip, xyz(s, PIVOT))
+    reach = norm(away)
+    u = over(away, reach)
+    du = over(across(sub(v, xyz(s, TURN)), u), reach)
+    return ToolMotion(tip, u, v, du, s[TIME])
+
+
+@compiled
+def permission(s: Floats) -> Permission:
+    """What a state of the law allows the task."""
+    if s[FROZEN] != 0.0:
+        return Permission(0.0, s[FROZEN])
+    return Permission(s[SCALE], 0.0 if s[SCALE] > 0.0 else _PROBING)

@@ -1,23 +1,53 @@
-"""Optical tracker: it measures the surgeon's tools S and O by their markers.
+"""Optical tracker: it measures the surgeon's tools by their markers.
 
 Section 5 of the paper: a Polaris Spectra of NDI "recovers data on surgeon's position
 and orientation for both tools simultaneously".
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydrake.common import RandomDistribution
-from pydrake.systems.framework import BasicVector
 
 from systems.common.block import Block
-from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import all_finite, along, cross, sub, unit, xyz
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import along, cross, sub, unit
+from systems.common.parameter import ParameterError, Rules, check, parameter, part
+from systems.common.signal import (
+    Field,
+    Many,
+    Vector,
+    finiteness,
+    flat,
+    reader,
+    size,
+    writer,
+)
+from systems.common.signals import Shaft, TrackedShaft
 
-TOOLS = ("S", "O")
+TOOLS = ("target", "obstacle")
 NEVER = -1.0  # s, the frame time before the first frame
+
+
+class MarkerNoise(NamedTuple):
+    """What errs in a frame of a tool: independent standard normal numbers."""
+
+    place: Annotated[Vector, Field("1", "of the markers' mean", (0.0, 0.0, 0.0))]
+    turn: Annotated[Vector, Field("1", "of the rotation vector", (0.0, 0.0, 0.0))]
+
+
+UNSEEN = TrackedShaft((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), NEVER, 0.0)
+"""A shaft before its first frame."""
+
+read_shaft = reader(Shaft)
+read_frame = reader(TrackedShaft)
+read_noise = reader(MarkerNoise)
+write_frame = writer(TrackedShaft)
+finite_shaft = finiteness(Shaft)
+_FRAME, _ERRORS = size(TrackedShaft), size(MarkerNoise)
 
 
 @dataclass
@@ -30,33 +60,21 @@ class MarkerBody:
     (Fitzpatrick 1998: TRE^2 = FLE^2/N (1 + sum_k d_k^2 / f_k^2 / 3)).
     """
 
-    # Root mean square error of one marker in three dimensions, in m (0.25 mm is
-    # quoted for a Polaris Spectra, 0.09 mm for a Vega in motion).
-    noise: float = 0.25e-3
-    # Number of markers, N.
-    markers: int = 4
-    # Root mean square distance of the markers from an axis across the shaft, in m.
-    spread: float = 0.035
-    # From the markers' mean along the shaft to the tip, in m: the lever arm.
-    lever: float = 0.35
-
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        if not 0.0 <= self.noise <= 0.01:
-            raise ValueError(
-                f"marker body: noise={self.noise} m must lie in [0, 0.01]; "
-                f"a Polaris Spectra's is 0.25e-3"
-            )
-        if self.markers < 3:
-            raise ValueError(
-                f"marker body: markers={self.markers} give no pose, expected >= 3"
-            )
-        if not 0.001 <= self.spread <= 1.0:
-            raise ValueError(
-                f"marker body: spread={self.spread} m must lie in [0.001, 1]"
-            )
-        if not 0.0 <= self.lever <= 2.0:
-            raise ValueError(f"marker body: lever={self.lever} m must lie in [0, 2]")
+    # 0.25 mm is quoted for a Polaris Spectra, 0.09 mm for a Vega in motion.
+    noise: float = parameter(
+        0.25e-3, "rms error of one marker in three dimensions", "m", least=0, most=0.01
+    )
+    markers: int = parameter(4, "their number N", least=3, most=20)
+    spread: float = parameter(
+        0.035,
+        "rms distance of the markers from an axis across",
+        "m",
+        least=1e-3,
+        most=1,
+    )
+    lever: float = parameter(
+        0.35, "from the markers' mean along the shaft to the tip", "m", least=0, most=2
+    )
 
     def sigma_position(self) -> float:
         """Standard deviation of the markers' mean along each axis, in m."""
@@ -71,82 +89,53 @@ class MarkerBody:
 class SightLoss:
     """A time in which the tracker does not see some tools."""
 
-    # In s: frames exposed at start <= t < end are lost.
-    start: float = 0.0
-    end: float = 0.0
-    # Which tools are hidden: "S", "O".
-    tools: list[str] = field(default_factory=lambda: list(TOOLS))
+    start: float = parameter(0.0, "of the first lost frame", "s", least=0, most=1e4)
+    end: float = parameter(0.0, "of the first one seen again", "s", least=0, most=1e4)
+    tools: list[str] = parameter(
+        [], "names of those that are hidden; all if none is named", shape=(-1,)
+    )
 
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        if not self.start <= self.end:
-            raise ValueError(
-                f"loss of sight: end={self.end} s must not come before "
-                f"start={self.start} s"
-            )
-        for tool in self.tools:
-            if tool not in TOOLS:
-                raise ValueError(
-                    f"loss of sight: there is no tool {tool!r}, expected "
-                    f"{' or '.join(TOOLS)}"
-                )
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        yield self.start <= self.end, "end", f">= start, {self.start} s"
 
 
 @dataclass
 class OpticalTrackerParams:
     """An optical tracker. The defaults are those of a Polaris."""
 
-    # Time between frames in s; the planner's period, so that frames fall on its
-    # instants.
-    period: float = 1.0 / 60.0
-    # From exposure to delivery, in s (14.2 ms measured on a Polaris Vega).
-    latency: float = 0.0142
-    # The markers on each tool.
-    body: MarkerBody = field(default_factory=MarkerBody)
-    # When the line of sight is blocked.
-    losses: list[SightLoss] = field(default_factory=list)
+    period: float = parameter(1 / 60, "between frames", "s", above=0, most=1)
+    # 14.2 ms were measured on a Polaris Vega.
+    latency: float = parameter(0.0142, "until it is delivered", "s", least=0, most=1)
+    body: MarkerBody = part(MarkerBody)
+    losses: list[SightLoss] = parameter(
+        [], "when the line of sight is blocked", shape=(-1,)
+    )
 
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        if not 0.0 < self.period < 10.0:
-            raise ValueError(
-                f"optical tracker: period={self.period} s must lie in (0, 10); "
-                f"a Polaris has 1/60"
-            )
-        if not 0.0 <= self.latency <= 1.0:
-            raise ValueError(
-                f"optical tracker: latency={self.latency} s must lie in [0, 1]"
-            )
-        self.body.check()
-        for loss in self.losses:
-            loss.check()
+
+def constants(body: MarkerBody) -> np.ndarray:
+    """The markers as `disturb` takes them."""
+    return packed(
+        lever=body.lever,
+        sigma_position=body.sigma_position(),
+        sigma_direction=body.sigma_direction(),
+    )
 
 
 @compiled
-def disturb(
-    shaft: Numbers,
-    noise: Numbers,
-    lever: float,
-    sigma_position: float,
-    sigma_direction: float,
-) -> tuple[float, float, float, float, float, float]:
+def disturb(params: Any, shaft: Shaft, noise: MarkerNoise) -> Shaft:
     """A shaft as its markers show it.
 
     Args:
-        shaft: True p_WP in m and u_W (6).
-        noise: Six standard normal numbers: markers' mean (3), rotation vector (3).
-        lever: From the markers' mean to the tip, in m.
-        sigma_position: Of the markers' mean along each axis, in m.
-        sigma_direction: Of the rotation about each axis, in rad.
-
-    Returns:
-        Measured p_WP in m and u_W (6).
+        params: A record of `constants`.
+        shaft: The true one.
+        noise: What errs.
     """
     # A small rotation: u + theta x u, made a unit vector again.
-    u = xyz(shaft, 3)
-    v = unit(along(u, sigma_direction, cross(xyz(noise, 3), u)))
-    p = along(xyz(shaft, 0), sigma_position, xyz(noise, 0))
-    return along(p, lever, sub(v, u)) + v
+    turn = cross(noise.turn, shaft.u)
+    u = unit(along(shaft.u, params.sigma_direction, turn))
+    p = along(shaft.tip, params.sigma_position, noise.place)
+    return Shaft(along(p, params.lever, sub(u, shaft.u)), u)
 
 
 @compiled
@@ -154,41 +143,42 @@ def _expose(
     record: np.ndarray,
     losses: np.ndarray,
     line: np.ndarray,
-    noise: np.ndarray,
-    shaft_S: np.ndarray,
-    shaft_O: np.ndarray,
     time: float,
+    noise: np.ndarray,
+    *shafts: np.ndarray,
 ) -> np.ndarray:
-    """The delay line with a new frame at its end, and without its oldest."""
-    params = record[0]
-    after = np.empty(len(line))
-    after[:-16] = line[16:]
-    frame = after[-16:]
-    frame[:] = line[-16:]
-    for tool in range(2):
-        shaft = shaft_S if tool == 0 else shaft_O
-        seen = all_finite(shaft)
+    """The delay line with a new frame at its end, and without its oldest.
+
+    Args:
+        record: Of `constants`.
+        losses: Records of each loss of sight: start and end in s, which tools (n).
+        line: Of each frame, of each tool a `TrackedShaft`, the oldest frame first.
+        time: Of exposure, in s.
+        noise: Of each tool a `MarkerNoise`.
+        *shafts: Of each tool a `Shaft`.
+    """
+    tools = len(shafts)
+    frames = line.reshape((-1, tools, _FRAME))
+    errors = noise.reshape((tools, _ERRORS))
+    after = np.empty_like(frames)
+    after[:-1] = frames[1:]
+    for tool in range(tools):
+        shaft = read_shaft(shafts[tool])
+        seen = finite_shaft(shaft)
         for loss in losses:
-            if loss[0] <= time < loss[1] and loss[2 + tool] > 0.0:
+            if loss.start <= time < loss.end and loss.hides[tool] > 0.0:
                 seen = False
-        at = 8 * tool
+        last = read_frame(frames[-1, tool])
+        shown = Shaft(last.tip, last.u)
         if seen:
-            measured = disturb(
-                shaft,
-                noise[6 * tool : 6 * tool + 6],
-                params.lever,
-                params.sigma_position,
-                params.sigma_direction,
-            )
-            for i in range(6):
-                frame[at + i] = measured[i]
-        frame[at + 6] = time
-        frame[at + 7] = 1.0 if seen else 0.0
-    return after
+            shown = disturb(record[0], shaft, read_noise(errors[tool]))
+        frame = TrackedShaft(shown.tip, shown.u, time, 1.0 if seen else 0.0)
+        after[-1, tool] = write_frame(frame)
+    return after.reshape(-1)
 
 
 class OpticalTracker(Block):
-    """Measures both of the surgeon's tools (sections 2.2 and 5).
+    """Measures the surgeon's tools (sections 2.2 and 5).
 
     Every period a frame is exposed; it is delivered at the first of the following
     instants that lies `latency` or more after its exposure (at least one period). A
@@ -197,61 +187,71 @@ class OpticalTracker(Block):
     invalid. Noise is white; a real tracker's has a slow part as well, which no filter
     removes and which is left out here.
 
-    Port ``S`` accepts the target tool's true shaft (6): p_WP in m and unit vector u_W,
-    world frame W. Port ``O`` accepts the obstacle tool's, likewise (6). Port ``noise``
-    accepts twelve independent standard normal numbers, renewed every period, six for S
-    and six for O. It is declared as Drake's Gaussian random input:
+    Ports ``target`` and ``obstacle``, or of whatever names the tools have, accept the
+    tools' true `Shaft`.
+    Port ``noise`` accepts the `MarkerNoise` of one tool after the other, renewed every
+    period. It is declared as Drake's Gaussian random input:
     `AddRandomInputs(params.period, builder)`, or a `RandomSource` of that period,
     feeds it, and `SetRandomContext` seeds it; zeros give a tracker without noise.
-    Port ``S_measured`` emits the last delivered frame of S (8): p_WP in m, u_W, the
-    time of its exposure in s (-1 before the first frame), and 1 if valid or 0.
-    Port ``O_measured`` emits that of O, likewise (8).
-
-    Args:
-        params: Rate, latency, markers, losses of sight.
-
-    Raises:
-        ValueError: If `params` make no sense.
+    Ports ``target_measured`` and ``obstacle_measured``, likewise, emit the tools' last
+    delivered frame, a `TrackedShaft`.
     """
 
-    def __init__(self, params: OpticalTrackerParams | None = None) -> None:
+    def __init__(
+        self,
+        params: OpticalTrackerParams | None = None,
+        tools: Sequence[str] = TOOLS,
+    ) -> None:
+        """Makes the block.
+
+        Args:
+            params: Rate, latency, markers, losses of sight.
+            tools: Names of the tools.
+
+        Raises:
+            ParameterError: If `params` make no sense, or hide a tool that is not there.
+        """
         super().__init__()
         params = params or OpticalTrackerParams()
-        params.check()
-        # Start, end, and whether S and O are hidden; the first one hides nothing.
-        losses = [[0.0] * 4]
-        for loss in params.losses:
-            hides = [float(tool in loss.tools) for tool in TOOLS]
-            losses.append([loss.start, loss.end, *hides])
-        self._constants = packed(
-            lever=params.body.lever,
-            sigma_position=params.body.sigma_position(),
-            sigma_direction=params.body.sigma_direction(),
+        check(params)
+        self._constants = constants(params.body)
+        self._losses = _packed_losses(params.losses, tools)
+        self._shafts = [self.signal_in(tool, Shaft) for tool in tools]
+        self._noise = self.signal_in(
+            "noise", Many(MarkerNoise, tuple(tools)), RandomDistribution.kGaussian
         )
-        self._losses = np.array(losses)
-        example = [0.05, 0.0, -0.12, 0.0, 0.0, -1.0]
-        self._shafts = [self.vector_in(tool, example) for tool in TOOLS]
-        self._noise = self.DeclareVectorInputPort(
-            "noise", BasicVector(np.zeros(12)), RandomDistribution.kGaussian
-        )
-        # The delay line, oldest frame first: S (8) and O (8) of each frame. The
-        # oldest is the one that has been delivered.
+        # The oldest frame of the delay line is the one that has been delivered.
         frames = max(1, math.ceil(params.latency / params.period - 1e-9))
-        unseen = [0.0, 0.0, 0.0, 0.0, 0.0, -1.0, NEVER, 0.0]
-        self.DeclareDiscreteState(np.array(2 * unseen * frames))
-        self.state_out("S_measured", unseen)
-        self.state_out("O_measured", unseen)
+        self.DeclareDiscreteState(flat((UNSEEN,) * (frames * len(tools))))
+        for tool in tools:
+            self.state_out(f"{tool}_measured", TrackedShaft, flat(UNSEEN))
+        firsts = [_FRAME * tool for tool in range(len(tools))]
+        self._delivered = [slice(first, first + _FRAME) for first in firsts]
         self.update_every(params.period, self._update)
 
     def _update(self, context: Any) -> tuple[np.ndarray, ...]:
-        noise: Any = self._noise.Eval(context)
         line = _expose(
             self._constants,
             self._losses,
             context.get_discrete_state(0).value(),
-            noise,
-            self._shafts[0].Eval(context),
-            self._shafts[1].Eval(context),
             context.get_time(),
+            self._noise.Eval(context),
+            *[port.Eval(context) for port in self._shafts],
         )
-        return line, line[:8], line[8:16]
+        return line, *[line[place] for place in self._delivered]
+
+
+def _packed_losses(losses: Sequence[SightLoss], tools: Sequence[str]) -> np.ndarray:
+    """The losses as `_expose` takes them."""
+    layout = [("start", float), ("end", float), ("hides", float, (len(tools),))]
+    records = np.zeros(len(losses), np.dtype(layout, align=True))
+    for index, (record, loss) in enumerate(zip(records, losses, strict=True)):
+        for tool in loss.tools:
+            if tool not in tools:
+                raise ParameterError(
+                    f"optical_tracker.losses[{index}].tools={loss.tools}: there is no "
+                    f"tool {tool!r}, expected names among {', '.join(tools)}"
+                )
+        hides = [float(tool in (loss.tools or tools)) for tool in tools]
+        record["start"], record["end"], record["hides"] = loss.start, loss.end, hides
+    return records

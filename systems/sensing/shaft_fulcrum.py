@@ -12,24 +12,25 @@ several times better than it is measured.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import (
     along,
     any_perpendicular,
     cross,
     dot,
+    over,
+    scaled,
     sub,
     unit,
-    xyz,
 )
+from systems.common.signal import Vector
 from systems.sensing.optical_tracker import MarkerBody
 
-Point = tuple[float, float, float]
-PointCovariance = tuple[float, float, float, float, float, float]
+type PointCovariance = tuple[float, float, float, float, float, float]
 """Of a point in W: (xx, xy, xz, yy, yz, zz) in m^2."""
 
 FIRST = -1.0
@@ -38,8 +39,31 @@ _QUIET = 4e-3  # rad, that the shaft may turn before its reference direction fol
 _NEAREST = 0.05  # m, from the markers' mean: a nearer fulcrum gives no direction
 
 
+class FulcrumState(NamedTuple):
+    """p_WG in m, its covariance, and the shaft's reference direction."""
+
+    g: Vector
+    P: PointCovariance
+    reference: Vector
+
+
+class Sight(NamedTuple):
+    """The tip that a line and the fulcrum give together.
+
+    Attributes:
+        tip: p_WP in m.
+        variance: Along each axis, of its noise, in m^2.
+        shared: Of the error that it takes over from the fulcrum, in m^2: that one is
+            slow, so that no filtering reduces it.
+    """
+
+    tip: Vector
+    variance: float
+    shared: float
+
+
 @compiled
-def lateral_variance(P: PointCovariance, u: Point) -> float:
+def lateral_variance(P: PointCovariance, u: Vector) -> float:
     """Mean variance of a point across the direction u (unit vector), in m^2."""
     xx, xy, xz, yy, yz, zz = P
     ux, uy, uz = u
@@ -50,8 +74,8 @@ def lateral_variance(P: PointCovariance, u: Point) -> float:
 
 @compiled
 def measure(
-    p: Point, P: PointCovariance, h: Point, value: float, variance: float
-) -> tuple[Point, PointCovariance]:
+    p: Vector, P: PointCovariance, h: Vector, value: float, variance: float
+) -> tuple[Vector, PointCovariance]:
     """Takes in that h . p = value, with the given variance.
 
     Args:
@@ -64,37 +88,30 @@ def measure(
     Returns:
         The new estimate and its covariance.
     """
-    x, y, z = p
     xx, xy, xz, yy, yz, zz = P
-    hx, hy, hz = h
-    ax = xx * hx + xy * hy + xz * hz
-    ay = xy * hx + yy * hy + yz * hz
-    az = xz * hx + yz * hy + zz * hz
-    s = hx * ax + hy * ay + hz * az + variance
-    kx, ky, kz = ax / s, ay / s, az / s
-    innovation = value - hx * x - hy * y - hz * z
-    return (
-        (x + kx * innovation, y + ky * innovation, z + kz * innovation),
-        (
-            xx - kx * ax,
-            xy - kx * ay,
-            xz - kx * az,
-            yy - ky * ay,
-            yz - ky * az,
-            zz - kz * az,
-        ),
+    a = dot((xx, xy, xz), h), dot((xy, yy, yz), h), dot((xz, yz, zz), h)  # P h
+    k = over(a, dot(h, a) + variance)
+    (ax, ay, az), (kx, ky, kz), (hx, hy, hz) = a, k, h
+    innovation = value - hx * p[0] - hy * p[1] - hz * p[2]
+    return along(p, innovation, k), (
+        xx - kx * ax,
+        xy - kx * ay,
+        xz - kx * az,
+        yy - ky * ay,
+        yz - ky * az,
+        zz - kz * az,
     )
 
 
 @compiled
 def measure_line(
-    p: Point,
+    p: Vector,
     P: PointCovariance,
-    c: Point,
-    u: Point,
-    reference: Point,
+    c: Vector,
+    u: Vector,
+    reference: Vector,
     variance: float,
-) -> tuple[Point, PointCovariance]:
+) -> tuple[Vector, PointCovariance]:
     """Takes in a line that passes the point, but for noise across the line.
 
     The line speaks across `reference` only, a quiet direction within some mrad of its
@@ -113,17 +130,12 @@ def measure_line(
     Returns:
         The new estimate and its covariance.
     """
-    cx, cy, cz = c
-    ux, uy, uz = u
-    rx, ry, rz = reference
     # Where the line pierces the plane through the estimate, across the reference.
-    t = (p[0] - cx) * rx + (p[1] - cy) * ry + (p[2] - cz) * rz
-    t /= ux * rx + uy * ry + uz * rz
-    cx, cy, cz = cx + t * ux, cy + t * uy, cz + t * uz
+    c = along(c, dot(sub(p, c), reference) / dot(u, reference), u)
     e = any_perpendicular(reference)
     f = cross(reference, e)
-    q, Q = measure(p, P, e, e[0] * cx + e[1] * cy + e[2] * cz, variance)
-    return measure(q, Q, f, f[0] * cx + f[1] * cy + f[2] * cz, variance)
+    q, Q = measure(p, P, e, dot(e, c), variance)
+    return measure(q, Q, f, dot(f, c), variance)
 
 
 def shaft_constants(body: MarkerBody, given: list[float] | None) -> dict[str, Any]:
@@ -146,56 +158,50 @@ def shaft_constants(body: MarkerBody, given: list[float] | None) -> dict[str, An
     }
 
 
-def initial_fulcrum(given: list[float] | None) -> list[float]:
-    """The state (12) before the first frame.
-
-    Fulcrum p_WG in m (3), its covariance (6), and the shaft's reference direction (3,
-    see `measure_line`).
-    """
-    return [*(given or [0.0] * 3), *[0.0] * 8, -1.0]
+def initial_fulcrum(given: list[float] | None) -> FulcrumState:
+    """The state before the first frame, of a fulcrum that is given or not."""
+    x, y, z = given or [0.0, 0.0, 0.0]
+    return FulcrumState((x, y, z), (0.0,) * 6, (0.0, 0.0, -1.0))
 
 
 @compiled
-def expected_fulcrum(params: Any, c: Point, u: Point) -> tuple[Point, PointCovariance]:
+def expected_fulcrum(params: Any, c: Vector, u: Vector) -> FulcrumState:
     """The fulcrum that is expected of a shaft when nothing else is known."""
     g = along(c, params.lever - params.depth, u)
     var = params.sigma_depth**2
     P = (var, 0.0, 0.0, var, 0.0, var)
     sigma = params.sigma_wall
-    return measure(g, P, (0.0, 0.0, 1.0), params.wall_height, sigma * sigma)
+    g, P = measure(g, P, (0.0, 0.0, 1.0), params.wall_height, sigma * sigma)
+    return FulcrumState(g, P, u)
 
 
 @compiled
 def absorb_line(
-    params: Any, x: Numbers, c: Point, u: Point, dt: float
-) -> tuple[tuple[float, ...], Point, float, float]:
+    params: Any, state: FulcrumState, c: Vector, u: Vector, dt: float
+) -> tuple[FulcrumState, Sight]:
     """Fuses the shaft's direction with the fulcrum's, and refines the fulcrum.
 
     Args:
         params: A record with `shaft_constants` and what is known beforehand; a line
             that passes the fulcrum at more than `gate` standard deviations belongs to
             another fulcrum.
-        x: State (12), see `initial_fulcrum`.
+        state: Before the frame.
         c: Measured mean of the markers in m.
         u: Measured direction of the shaft, a unit vector.
         dt: Time since the frame before in s, or `FIRST` at the first frame.
 
     Returns:
-        The state after the frame; the fused tip in m; the variance along each
-        axis in m^2 of its noise, and of the error it takes over from the
-        fulcrum: that one is slow, so that no filtering reduces it.
+        The state after the frame, and the tip in it.
     """
     lever, var_c, var_u = params.lever, params.var_c, params.var_u
-    g = xyz(x, 0)
-    P = (x[3], x[4], x[5], x[6], x[7], x[8])
-    r = xyz(x, 9)
+    g, P, r = state
     is_first = not params.given and dt < 0.0
     if is_first:
-        g, P = expected_fulcrum(params, c, u)
-        r = u
+        g, P, r = expected_fulcrum(params, c, u)
     elif not params.given:
         q = params.fulcrum_drift * params.fulcrum_drift * dt
-        P = (P[0] + q, P[1], P[2], P[3] + q, P[4], P[5] + q)
+        xx, xy, xz, yy, yz, zz = P
+        P = (xx + q, xy, xz, yy + q, yz, zz + q)
     d = sub(g, c)
     d2 = dot(d, d)
     ahead = dot(d, u)
@@ -205,14 +211,13 @@ def absorb_line(
     variance, shared = params.var_tip, 0.0
     if d2 - ahead * ahead > params.gate * params.gate * (var_line + var_g):
         if not params.given:  # another fulcrum: begin again
-            g, P = expected_fulcrum(params, c, u)
-            r = u
+            g, P, r = expected_fulcrum(params, c, u)
     elif ahead > _NEAREST and not is_first:
         distance = math.sqrt(d2)
         e = unit(d)
         weight = d2 * var_u / (var_line + var_g)
         rest = 1.0 - weight
-        w = along((rest * u[0], rest * u[1], rest * u[2]), weight, e)
+        w = along(scaled(rest, u), weight, e)
         ratio = weight * lever / distance
         variance = (1.0 - ratio) ** 2 * var_c
         variance += (rest * lever) ** 2 * var_u
@@ -223,4 +228,4 @@ def absorb_line(
     if not params.given:
         g, P = measure_line(g, P, c, u, r, var_line)
     tip = along(c, lever, unit(w))
-    return g + P + r, tip, variance, shared
+    return FulcrumState(g, P, r), Sight(tip, variance, shared)

@@ -10,7 +10,7 @@ import math
 
 from systems.common.compiled import compiled
 
-Covariance = tuple[float, float, float, float, float, float]
+type Covariance = tuple[float, float, float, float, float, float]
 
 
 @compiled

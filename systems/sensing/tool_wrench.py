@@ -14,7 +14,7 @@ those of the plant's own model, as of an accelerometer that is built into the mo
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from typing import Any
 
@@ -27,87 +27,71 @@ from pydrake.multibody.tree import ModelInstanceIndex
 from plants.abdomen.abdomen import Abdomen
 from plants.instruments.instrument import InstrumentParams
 from systems.common.block import Block
+from systems.common.compiled import packed
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import example, flat, size
+from systems.common.signals import ShaftMotion, Wrench
+from systems.common.step_block import wired
 from systems.sensing import sensor_noise
-from systems.sensing.wrench_kernel import shaft_of, wall_wrench
+from systems.sensing.wrench_kernel import SILENCE, Fault, shaft_motion, wall_wrench
 
-_SILENCE = [0.0] * 7
-_UPRIGHT = [0.0, 0.0, 0.22, 0.0, 0.0, -1.0, *[0.0] * 6]
+_NOWHERE = np.zeros(3)
+_SHAFT = size(ShaftMotion)
+_ROW = _SHAFT + size(Wrench)
 
 
 @dataclass
 class ToolWrenchParams:
-    """Parameters of `ToolWrench`.
+    """Parameters of `ToolWrench`."""
 
-    Attributes:
-        frame: The plant's frame that the sensor sits in: the instrument's body.
-        force_noise: White noise of each force axis, in N.
-        moment_noise: White noise of each moment axis, in N m.
-        force_drift: Random walk of the force bias, in N/sqrt(s).
-        moment_drift: Random walk of the moment bias, in N m/sqrt(s).
-        tare_samples: Readings whose mean is taken for zero before the shaft enters
-            the trocar; 0 leaves the offset of the sensor in.
-        force_offset: Offset of each force axis before taring, in N.
-        moment_offset: Offset of each moment axis before taring, in N m.
-        mass_error: Relative error of the instrument's mass in the model.
-        force_range: Beyond it a force axis is saturated, in N.
-        moment_range: Beyond it a moment axis is saturated, in N m.
-        delay: Samples that the wrench is late against the pose.
-        aligned: Whether the shaft's pose is held back by as much, so that the two
-            belong together; what is late is then predicted. A few milliseconds
-            between force and pose cost more than the delay itself.
-        lost: Times in s between which the sensor is silent: start, end, start, ...
-        period: Of the readings, in s.
-        seed: Of the noise.
-    """
+    frame: str = parameter("instrument", "of the plant, in which the sensor sits")
+    # White noise, and the random walk of the bias.
+    force_noise: float = parameter(
+        0.05, "standard deviation of each force axis", "N", least=0, most=5
+    )
+    moment_noise: float = parameter(
+        0.005, "standard deviation of each moment axis", "N m", least=0, most=0.5
+    )
+    force_drift: float = parameter(
+        0.004, "random walk of the force bias", "N/sqrt(s)", least=0, most=1
+    )
+    moment_drift: float = parameter(
+        0.0004, "random walk of the moment bias", "N m/sqrt(s)", least=0, most=0.1
+    )
+    tare_samples: int = parameter(
+        240, "readings taken for zero before; 0 leaves the offset", least=0, most=10**5
+    )
+    force_offset: float = parameter(
+        0.3, "of each force axis before taring", "N", least=-50, most=50
+    )
+    moment_offset: float = parameter(
+        0.02, "of each moment axis before taring", "N m", least=-5, most=5
+    )
+    mass_error: float = parameter(
+        0.0, "relative error of the instrument's known mass", least=-0.5, most=0.5
+    )
+    force_range: float = parameter(
+        60.0, "beyond it a force axis is saturated", "N", above=0, most=500
+    )
+    moment_range: float = parameter(
+        5.0, "beyond it a moment axis is saturated", "N m", above=0, most=50
+    )
+    delay: int = parameter(
+        0, "samples that the wrench is late against the pose", least=0, most=12
+    )
+    # So that the two belong together; what is late is then predicted. A few
+    # milliseconds between force and pose cost more than the delay itself.
+    aligned: bool = parameter(True, "whether the pose is held back by as much")
+    lost: list[float] = parameter(
+        [], "silence: its start, end, start, ...", "s", least=0, most=1e4, shape=(-1,)
+    )
+    period: float = parameter(1 / 120, "of the readings", "s", above=0, most=0.1)
+    seed: int = parameter(0, "of the noise", least=0, most=2**63)
 
-    frame: str = "instrument"
-    force_noise: float = 0.05
-    moment_noise: float = 0.005
-    force_drift: float = 0.004
-    moment_drift: float = 0.0004
-    tare_samples: int = 240
-    force_offset: float = 0.3
-    moment_offset: float = 0.02
-    mass_error: float = 0.0
-    force_range: float = 60.0
-    moment_range: float = 5.0
-    delay: int = 0
-    aligned: bool = True
-    lost: list[float] = field(default_factory=list)
-    period: float = 1.0 / 120.0
-    seed: int = 0
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name in ("force_range", "moment_range", "period"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(
-                    f"tool_wrench.{name}={getattr(self, name)}: expected > 0"
-                )
-        for name in ("force_noise", "moment_noise", "force_drift", "moment_drift"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(
-                    f"tool_wrench.{name}={getattr(self, name)}: expected >= 0"
-                )
-        for name in ("delay", "tare_samples", "seed"):
-            if getattr(self, name) < 0:
-                raise ValueError(
-                    f"tool_wrench.{name}={getattr(self, name)}: expected >= 0"
-                )
-        if self.delay > 12:
-            raise ValueError(
-                f"tool_wrench.delay={self.delay} samples: expected at most 12"
-            )
-        if abs(self.mass_error) > 0.5:
-            raise ValueError(
-                f"tool_wrench.mass_error={self.mass_error}: expected in [-0.5, 0.5]"
-            )
-        pairs = self.lost
-        if len(pairs) % 2 or sorted(pairs) != pairs:
-            raise ValueError(
-                f"tool_wrench.lost={pairs}: expected rising times in pairs, "
-                "e.g. [3.0, 4.5]"
-            )
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        paired = len(self.lost) % 2 == 0 and sorted(self.lost) == self.lost
+        yield paired, "lost", "rising times in pairs, e.g. [3.0, 4.5]"
 
 
 def transverse_inertia(params: InstrumentParams) -> float:
@@ -171,11 +155,9 @@ class ToolWrench(Block):
 
     Port ``body_spatial_accelerations`` accepts the plant's port of that name.
 
-    Port ``shaft`` emits the sensor's origin p_WS [m], the shaft's direction u_W
-    towards the tip, v_WS [m/s] and du_W/dt [1/s] (12).
+    Port ``shaft`` emits the `ShaftMotion`.
 
-    Port ``wrench`` emits the wall's force on the shaft [N], its moment about the
-    sensor's origin [N m], and 1, or 0 while the sensor is silent or saturated (7).
+    Port ``wrench`` emits the `Wrench`; silence while the sensor is lost or saturated.
     """
 
     def __init__(
@@ -199,19 +181,23 @@ class ToolWrench(Block):
         """
         super().__init__()
         p = self._params = params or ToolWrenchParams()
-        p.check()
+        check(p)
         instrument = instrument or InstrumentParams()
         share = 1.0 + p.mass_error
-        self._instrument = np.array(
-            [
-                share * instrument.mass,
-                instrument.centre,
-                share * transverse_inertia(instrument),
-            ]
+        self._joint, self._body, self._sleeve = joint, body, sleeve
+        self._constants = packed(
+            mass=share * instrument.mass,
+            centre=instrument.centre,
+            inertia=share * transverse_inertia(instrument),
+            force_range=float(p.force_range),
+            moment_range=float(p.moment_range),
+            sleeve_mass=share * sleeve_mass if sleeve >= 0 else 0.0,
         )
-        self._joint, self._body = joint, body
-        self._sleeve, self._sleeve_mass = sleeve, share * sleeve_mass
-        self._limit = np.array([p.force_range, p.moment_range])
+        # Where a number stands, the kernels take one of Drake's arrays as it is.
+        self._move = wired(shaft_motion, 0, [], [9, 3, 3, 3], [ShaftMotion], False)
+        reading = [9, ShaftMotion, 3, 3, 3, 3, 3, Fault, 3, 3]
+        self._read = wired(wall_wrench, 1, [], reading, [Wrench], False)
+        self._silence = flat(SILENCE)
         step = math.sqrt(p.period)
         noise = (p.force_noise,) * 3 + (p.moment_noise,) * 3
         drift = (step * p.force_drift,) * 3 + (step * p.moment_drift,) * 3
@@ -233,52 +219,59 @@ class ToolWrench(Block):
             "body_spatial_accelerations", Value([SpatialAcceleration.Zero()])
         )
         moving = {self._poses.ticket(), self._velocities.ticket()}
-        self._shaft = self.cached("shaft", self._calc_shaft, moving)
+        self._motion = self.cached("motion", self._calc_motion, moving)
+        late = {self.xd_ticket()}
         feeling = {
-            self._shaft.ticket(),
+            self._motion.ticket(),
             self._forces.ticket(),
             self._accelerations.ticket(),
             self.time_ticket(),
         }
         if p.delay:
             # Rows of shaft and wrench, the oldest first; silent before the start.
-            start = np.tile([*_UPRIGHT, *_SILENCE], p.delay)
-            self._late = self.DeclareDiscreteState(start)
-            self.vector_out("wrench", 7, self._oldest_wrench, {self.xd_ticket()})
+            row = np.concatenate([flat(example(ShaftMotion)), self._silence])
+            self.DeclareDiscreteState(np.tile(row, p.delay))
+            self.signal_out(
+                "wrench", Wrench, lambda context: _late(context)[_SHAFT:_ROW], late
+            )
             self.update_every(p.period, self._push)
         else:
-            self.vector_out("wrench", 7, self._calc_wrench, feeling)
+            self.signal_out("wrench", Wrench, self._calc_wrench, feeling)
         if p.delay and p.aligned:
-            self.vector_out("shaft", 12, self._oldest_shaft, {self.xd_ticket()})
+            self.signal_out(
+                "shaft", ShaftMotion, lambda context: _late(context)[:_SHAFT], late
+            )
         else:
-            self.vector_out("shaft", 12, self._shaft_vector, {self._shaft.ticket()})
+            self.signal_out(
+                "shaft", ShaftMotion, self._calc_shaft, {self._motion.ticket()}
+            )
 
-    def _calc_shaft(self, context: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The port's vector, angular velocity, and R_WM."""
+    def _calc_motion(self, context: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The shaft, the mount's angular velocity, and R_WM."""
         X_WM = self._poses.Eval(context)[self._body]
         V_WM = self._velocities.Eval(context)[self._body]
         R_WM, w = X_WM.rotation().matrix(), V_WM.rotational()
-        shaft = shaft_of(R_WM, X_WM.translation(), V_WM.translational(), w)
+        shaft = self._move(R_WM, X_WM.translation(), V_WM.translational(), w)
         return shaft, w, R_WM
 
-    def _shaft_vector(self, context: Any) -> Any:
-        return self._shaft.Eval(context)[0]
+    def _calc_shaft(self, context: Any) -> np.ndarray:
+        return self._motion.Eval(context)[0]
 
-    def _calc_wrench(self, context: Any) -> Any:
+    def _calc_wrench(self, context: Any) -> np.ndarray:
         p = self._params
         time = context.get_time()
         if p.lost and silent(p.lost, time):
-            return _SILENCE
-        shaft, w, R_WM = self._shaft.Eval(context)
+            return self._silence
+        shaft, w, R_WM = self._motion.Eval(context)
         accelerations = self._accelerations.Eval(context)
         A_WM = accelerations[self._body]
         F = self._forces.Eval(context)[self._joint]
-        sleeve = np.zeros(7)
+        p_WC = a_WC = _NOWHERE
         if self._sleeve >= 0:
-            sleeve[0] = self._sleeve_mass
-            sleeve[1:4] = self._poses.Eval(context)[self._sleeve].translation()
-            sleeve[4:7] = accelerations[self._sleeve].translational()
-        return wall_wrench(
+            p_WC = self._poses.Eval(context)[self._sleeve].translation()
+            a_WC = accelerations[self._sleeve].translational()
+        return self._read(
+            self._constants,
             R_WM,
             shaft,
             w,
@@ -287,21 +280,21 @@ class ToolWrench(Block):
             F.translational(),
             F.rotational(),
             sensor_noise.fault(p.seed, max(0, round(time / p.period)), self._faults),
-            self._instrument,
-            self._limit,
-            sleeve,
+            p_WC,
+            a_WC,
         )
 
-    def _oldest_shaft(self, context: Any) -> Any:
-        return context.get_discrete_state(self._late).value()[:12]
+    def _push(self, context: Any) -> np.ndarray:
+        late = context.get_discrete_state_vector().value()[_ROW:]
+        return np.concatenate(
+            [late, self._calc_shaft(context), self._calc_wrench(context)]
+        )
 
-    def _oldest_wrench(self, context: Any) -> Any:
-        return context.get_discrete_state(self._late).value()[12:19]
 
-    def _push(self, context: Any) -> Any:
-        late = context.get_discrete_state(self._late).value()
-        now = self._shaft_vector(context), self._calc_wrench(context)
-        return np.concatenate([late[19:], *now])
+def _late(context: Any) -> np.ndarray:
+    """The oldest row of shaft and wrench."""
+    row: np.ndarray = context.get_discrete_state_vector().value()[:_ROW]
+    return row
 
 
 def add_tool_wrench(

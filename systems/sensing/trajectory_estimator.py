@@ -5,27 +5,23 @@ finds "its trajectory thanks to the velocity and acceleration parameters", for t
 local planner. The paper gives no equations; here a Kalman filter over Singer's model.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.block import Block
-from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import (
-    Vector,
-    all_finite,
-    along,
-    dot,
-    norm,
-    sub,
-    unit,
-    xyz,
-)
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import along, dot, norm, scaled, sub, unit
+from systems.common.parameter import Rules, check, parameter, part
+from systems.common.signal import Vector, finiteness
+from systems.common.signals import Estimate, Point, TrackedShaft
+from systems.common.step_block import StepBlock
 from systems.sensing.optical_tracker import NEVER, MarkerBody
 from systems.sensing.shaft_fulcrum import (
     FIRST,
+    FulcrumState,
+    PointCovariance,
     absorb_line,
     initial_fulcrum,
     shaft_constants,
@@ -40,92 +36,94 @@ from systems.sensing.singer import (
 
 @dataclass
 class TrajectoryEstimatorParams:
-    """What the estimator takes for granted of a tool, and when it gives up. SI."""
+    """What the estimator takes for granted of a tool, and when it gives up."""
 
-    # Time between updates in s; the tracker's.
-    period: float = 1.0 / 60.0
-    # The markers on the tool, as the tracker's.
-    body: MarkerBody = field(default_factory=MarkerBody)
-    # The hand's acceleration along each axis: standard deviation in m/s^2 and time
-    # constant in s.
-    sigma_acceleration: float = 0.10
-    acceleration_time: float = 0.25
-    # Speed along each axis that a tool may have when it is first seen, standard
-    # deviation in m/s.
-    sigma_velocity: float = 0.03
-    # Tremor that is in the measured tip but is no part of the trajectory, root mean
-    # square in three dimensions, in m.
-    tremor_rms: float = 100e-6
-    # A measured tip further from the predicted one than this many standard
-    # deviations (in three dimensions) is refused.
-    gate: float = 5.0
-    # The tool is no longer known if the standard deviation of its tip along an axis
-    # exceeds this, in m,
-    sigma_limit: float = 0.003
-    # or if the last good frame is older than this, in s. The prediction goes no
-    # further either: beyond it the tool is held where it was predicted last.
-    age_limit: float = 0.5
-    # The tool's fulcrum in W in m, if it is given; otherwise it is estimated.
-    fulcrum: list[float] | None = None
-    # What is known of a fulcrum beforehand: the abdominal wall's height in W in m,
-    # and its standard deviation; and how far above the tip it may be.
-    wall_height: float = 0.0
-    sigma_wall: float = 0.010
-    depth: float = 0.12
-    sigma_depth: float = 0.06
-    # How fast a fulcrum may wander: random walk along each axis in m/sqrt(s).
-    fulcrum_drift: float = 0.1e-3
+    period: float = parameter(
+        1 / 60, "of the update: the tracker's", "s", above=0, most=1
+    )
+    body: MarkerBody = part(MarkerBody)  # as the tracker has it
+    # Of the hand, along each axis.
+    sigma_acceleration: float = parameter(
+        0.10, "standard deviation of the acceleration", "m/s^2", above=0, most=10
+    )
+    acceleration_time: float = parameter(
+        0.25, "its time constant", "s", above=0, most=10
+    )
+    sigma_velocity: float = parameter(
+        0.03, "standard deviation of the speed when first seen", "m/s", above=0, most=1
+    )
+    tremor_rms: float = parameter(
+        100e-6, "tremor, which is no part of the trajectory", "m", least=0, most=0.002
+    )
+    gate: float = parameter(
+        5.0, "standard deviations beyond which a tip is refused", least=1, most=20
+    )
+    # The prediction goes no further than the age limit: beyond it the tool is held
+    # where it was predicted last.
+    sigma_limit: float = parameter(
+        0.003, "standard deviation of a known tip at the most", "m", above=0, most=0.02
+    )
+    age_limit: float = parameter(
+        0.5, "age of a known tool's last good frame at the most", "s", above=0, most=2
+    )
+    fulcrum: list[float] | None = parameter(
+        None, "p_WG if it is given, else estimated", "m", least=-1, most=1, shape=(3,)
+    )
+    # What is known of a fulcrum beforehand.
+    wall_height: float = parameter(
+        0.0, "of the abdominal wall, z in W", "m", least=-1, most=1
+    )
+    sigma_wall: float = parameter(
+        0.01, "deviation of wall_height", "m", above=0, most=1
+    )
+    depth: float = parameter(0.12, "of a tip below its fulcrum", "m", least=0, most=0.5)
+    sigma_depth: float = parameter(0.06, "deviation of depth", "m", above=0, most=1)
+    fulcrum_drift: float = parameter(
+        0.1e-3,
+        "random walk of a fulcrum along each axis",
+        "m/sqrt(s)",
+        least=0,
+        most=0.1,
+    )
 
-    def check(self) -> None:
-        """Raises ValueError if a value makes no sense."""
-        self.body.check()
-        for name in (
-            "period",
-            "sigma_acceleration",
-            "acceleration_time",
-            "sigma_velocity",
-            "gate",
-            "sigma_limit",
-            "age_limit",
-            "sigma_wall",
-            "sigma_depth",
-        ):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise ValueError(
-                    f"trajectory estimator: {name}={value} must be finite and > 0"
-                )
-        for name in ("tremor_rms", "depth", "fulcrum_drift"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ValueError(
-                    f"trajectory estimator: {name}={value} must be finite and >= 0"
-                )
-        if self.age_limit < self.period:
-            raise ValueError(
-                f"trajectory estimator: age_limit={self.age_limit} s must be at least "
-                f"the period, {self.period} s"
-            )
-        if not math.isfinite(self.wall_height):
-            raise ValueError(
-                f"trajectory estimator: wall_height={self.wall_height} must be finite"
-            )
-        if self.fulcrum is not None and (
-            len(self.fulcrum) != 3 or not all(map(math.isfinite, self.fulcrum))
-        ):
-            raise ValueError(
-                f"trajectory estimator: fulcrum={self.fulcrum} must be 3 finite "
-                f"numbers, or null if it is to be estimated"
-            )
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        lived = self.age_limit >= self.period
+        yield lived, "age_limit", f"at least the period, {self.period} s"
+
+
+class State(NamedTuple):
+    """The filters' state.
+
+    Attributes:
+        p: p_WP in m; with `v` in m/s and `a` in m/s^2 the trajectory.
+        v: Likewise.
+        a: Likewise.
+        P: Their covariance, see `singer`.
+        g: With `G` and `reference` the fulcrum's filter, see `FulcrumState`.
+        G: Likewise.
+        reference: Likewise.
+        time: Of the last good frame, in s.
+        shared: Variance of the tip that comes from the fulcrum's own error, in m^2.
+    """
+
+    p: Vector
+    v: Vector
+    a: Vector
+    P: Covariance
+    g: Vector
+    G: PointCovariance
+    reference: Vector
+    time: float
+    shared: float
+
+
+finite_point = finiteness(Point)
 
 
 def constants(params: TrajectoryEstimatorParams) -> np.ndarray:
-    """The parameters as the compiled functions take them.
-
-    Raises:
-        ValueError: If `params` make no sense.
-    """
-    params.check()
+    """The parameters as the compiled functions take them."""
+    check(params)
     return packed(
         params,
         alpha=1.0 / params.acceleration_time,
@@ -134,109 +132,96 @@ def constants(params: TrajectoryEstimatorParams) -> np.ndarray:
     )
 
 
-def initial(params: TrajectoryEstimatorParams) -> np.ndarray:
-    """The state (29) before the first frame.
-
-    p, v, a (9), their covariance (6, see `singer`), the fulcrum's filter (12, see
-    `shaft_fulcrum`), time of the last good frame in s (1), and the variance of the
-    tip that comes from the fulcrum's own error (1).
-    """
-    return np.array([0.0] * 15 + initial_fulcrum(params.fulcrum) + [NEVER, 0.0])
+def initial(params: TrajectoryEstimatorParams) -> State:
+    """The state before the first frame."""
+    rest = (0.0, 0.0, 0.0)
+    fulcrum = initial_fulcrum(params.fulcrum)
+    return State(rest, rest, rest, (0.0,) * 6, *fulcrum, NEVER, 0.0)
 
 
 @compiled
-def _predict_covariance(params: Any, x: Numbers, dt: float) -> Covariance:
-    now = (x[9], x[10], x[11], x[12], x[13], x[14])
-    return predict_covariance(now, dt, params.alpha, params.sigma_acceleration)
+def _predict_covariance(params: Any, x: State, dt: float) -> Covariance:
+    return predict_covariance(x.P, dt, params.alpha, params.sigma_acceleration)
 
 
 @compiled
-def _predict_mean(params: Any, x: Numbers, dt: float) -> tuple[Vector, Vector, Vector]:
+def _predict_mean(params: Any, x: State, dt: float) -> tuple[Vector, Vector, Vector]:
     kp, kv, ka = gains(dt, params.alpha)
-    p, v, a = xyz(x, 0), xyz(x, 3), xyz(x, 6)
-    return (
-        along(along(p, dt, v), kp, a),
-        along(v, kv, a),
-        (ka * a[0], ka * a[1], ka * a[2]),
-    )
+    p = along(along(x.p, dt, x.v), kp, x.a)
+    return p, along(x.v, kv, x.a), scaled(ka, x.a)
 
 
 @compiled
-def absorb(params: Any, x: np.ndarray, m: Numbers) -> np.ndarray:
+def absorb(params: Any, x: State, m: TrackedShaft) -> State:
     """The state after a measurement; the same state if there is nothing new.
 
     Args:
         params: A record of `constants`.
-        x: State (29), see `initial`.
-        m: p_WP, u_W, frame time, valid (8); refused if it is old, invalid, not
-            finite, or too far from where the tip can be.
+        x: The state before it.
+        m: Refused if it is old, invalid, not finite, or too far from where the tip
+            can be.
     """
-    last, frame, valid = x[27], m[6], m[7]
-    if not valid >= 0.5 or not last < frame < math.inf:
+    if not m.valid >= 0.5 or not x.time < m.time < math.inf:
         return x
-    measured = xyz(m, 0)
-    length = norm(xyz(m, 3))
-    if not 0.9 < length < 1.1 or not all_finite(measured):
+    if not 0.9 < norm(m.u) < 1.1 or not finite_point(Point(m.tip)):
         return x
-    u = unit(xyz(m, 3))
-    dt = FIRST if last == NEVER else frame - last
+    u = unit(m.u)
+    dt = FIRST if x.time == NEVER else m.time - x.time
     if dt < 0.0 or dt > params.age_limit:
         var_v = params.sigma_velocity * params.sigma_velocity
         var_a = params.sigma_acceleration * params.sigma_acceleration
         P = (1.0, 0.0, 0.0, var_v, 0.0, var_a)
         rest = (0.0, 0.0, 0.0)
-        p, v, a = measured, rest, rest
+        p, v, a = m.tip, rest, rest
     else:
         P = _predict_covariance(params, x, dt)
         p, v, a = _predict_mean(params, x, dt)
-        miss = sub(measured, p)
-        variance = P[0] + params.var_tip + params.var_tremor + x[28]
+        miss = sub(m.tip, p)
+        variance = P[0] + params.var_tip + params.var_tremor + x.shared
         if dot(miss, miss) > params.gate * params.gate * variance:
             return x
-    c = along(measured, -params.lever, u)
-    fulcrum, tip, variance, shared = absorb_line(params, x[15:27], c, u, dt)
-    P, (kp, kv, ka) = correct_covariance(P, variance + params.var_tremor)
-    innovation = sub(tip, p)
-    p = along(p, kp, innovation)
-    v = along(v, kv, innovation)
-    a = along(a, ka, innovation)
-    return np.array(p + v + a + P + fulcrum + (frame, shared))
+    c = along(m.tip, -params.lever, u)
+    before = FulcrumState(x.g, x.G, x.reference)
+    fulcrum, seen = absorb_line(params, before, c, u, dt)
+    P, (kp, kv, ka) = correct_covariance(P, seen.variance + params.var_tremor)
+    miss = sub(seen.tip, p)
+    p, v, a = along(p, kp, miss), along(v, kv, miss), along(a, ka, miss)
+    g, G, reference = fulcrum
+    return State(p, v, a, P, g, G, reference, m.time, seen.shared)
 
 
 @compiled
-def predict(params: Any, x: np.ndarray, t: float) -> np.ndarray:
-    """The estimate (17) at time `t` in s, see the port of `TrajectoryEstimator`.
+def predict(params: Any, x: State, t: float) -> Estimate:
+    """The estimate at time `t` in s, see the port of `TrajectoryEstimator`.
 
     Args:
         params: A record of `constants`.
-        x: State (29), see `initial`.
+        x: The state.
         t: Time in s.
     """
-    age = max(t - x[27], 0.0)
+    age = max(t - x.time, 0.0)
     p, v, a = _predict_mean(params, x, min(age, params.age_limit))
     if age > params.age_limit:
         v = a = (0.0, 0.0, 0.0)
-    sigmas = (1.0, 1.0, 1.0)
-    if x[27] != NEVER:
+    sigma_p, sigma_v, sigma_a = 1.0, 1.0, 1.0
+    if x.time != NEVER:
         pp, _, _, vv, _, aa = _predict_covariance(params, x, age)
-        pp += x[28] + params.var_tremor
-        sigmas = (math.sqrt(pp), math.sqrt(vv), math.sqrt(aa))
-    known = age <= params.age_limit and sigmas[0] <= params.sigma_limit
-    fulcrum = xyz(x, 15)
-    return np.array(p + v + a + fulcrum + sigmas + (1.0 if known else 0.0, age))
+        pp += x.shared + params.var_tremor
+        sigma_p, sigma_v, sigma_a = math.sqrt(pp), math.sqrt(vv), math.sqrt(aa)
+    known = age <= params.age_limit and sigma_p <= params.sigma_limit
+    yes = 1.0 if known else 0.0
+    return Estimate(p, v, a, x.g, sigma_p, sigma_v, sigma_a, yes, age)
 
 
 @compiled
-def _absorb(record: np.ndarray, x: np.ndarray, m: np.ndarray) -> np.ndarray:
-    return absorb(record[0], x, m)
+def _step(
+    params: Any, state: State, time: float, measurement: TrackedShaft
+) -> tuple[State, Estimate]:
+    after = absorb(params, state, measurement)
+    return after, predict(params, after, time)
 
 
-@compiled
-def _estimate(record: np.ndarray, x: np.ndarray, m: np.ndarray, t: float) -> np.ndarray:
-    return predict(record[0], absorb(record[0], x, m), t)
-
-
-class TrajectoryEstimator(Block):
+class TrajectoryEstimator(StepBlock):
     """Estimates one tool's trajectory and fulcrum from its tracked shaft (section 2.2).
 
     A frame that is delivered at an instant is in the estimate of the same instant: the
@@ -245,42 +230,28 @@ class TrajectoryEstimator(Block):
     the tool is out of sight the prediction goes on and the standard deviations grow;
     a frame that is late by more than the age limit starts the trajectory anew.
 
-    Port ``measurement`` accepts a tracked shaft (8): p_WP in m, unit vector u_W, time
-    of exposure in s, valid (1 or 0), world frame W. Port ``estimate`` emits (17),
-    predicted to the time of the evaluation: p_WP in m, v_WP in m/s, a_WP in m/s^2,
-    the tool's fulcrum p_WG in m (3 each, in W), then along each axis the standard
-    deviations sigma_p in m (of the true tip, tremor included), sigma_v in m/s and
-    sigma_a in m/s^2 (of the trajectory, tremor excluded), known (1 if the estimate is
-    usable, else 0), and the age of the last good frame in s.
-
-    Args:
-        params: Markers, model of the hand, limits, fulcrum.
-
-    Raises:
-        ValueError: If `params` make no sense.
+    Port ``measurement`` accepts a `TrackedShaft`.
+    Port ``estimate`` emits the `Estimate`, predicted to the time of the evaluation;
+    sigma_p is of the true tip, tremor included, sigma_v and sigma_a are of the
+    trajectory, tremor excluded.
     """
 
     def __init__(self, params: TrajectoryEstimatorParams | None = None) -> None:
+        """Makes the block.
+
+        Args:
+            params: Markers, model of the hand, limits, fulcrum.
+
+        Raises:
+            ParameterError: If `params` make no sense.
+        """
         super().__init__()
         params = params or TrajectoryEstimatorParams()
-        self._constants = constants(params)
-        self._measurement = self.vector_in(
-            "measurement", [0.05, 0.0, -0.12, 0.0, 0.0, -1.0, 0.0, 1.0]
+        self.declare_step(
+            _step,
+            [constants(params)],
+            {"measurement": TrackedShaft},
+            initial(params),
+            {"estimate": Estimate},
+            params.period,
         )
-        self.DeclareDiscreteState(initial(params))
-        self.vector_out(
-            "estimate",
-            17,
-            self._calc_estimate,
-            {self.xd_ticket(), self._measurement.ticket(), self.time_ticket()},
-        )
-        self.update_every(params.period, self._update)
-
-    def _update(self, context: Any) -> np.ndarray:
-        state = context.get_discrete_state(0).value()
-        return _absorb(self._constants, state, self._measurement.Eval(context))
-
-    def _calc_estimate(self, context: Any) -> np.ndarray:
-        state = context.get_discrete_state(0).value()
-        measurement = self._measurement.Eval(context)
-        return _estimate(self._constants, state, measurement, context.get_time())

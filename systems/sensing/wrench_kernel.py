@@ -1,89 +1,91 @@
 """The tool's wrench from the sensor's reading, compiled (see `tool_wrench`)."""
 
-from math import isfinite
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.compiled import compiled
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import along, cross, plus, scaled, sub, xyz
+from systems.common.signal import Vector, finiteness
+from systems.common.signals import ShaftMotion, Wrench
 
-Floats = np.ndarray
 _GRAVITY = 9.81
+SILENCE = Wrench((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
+"""The wrench of a sensor that says nothing."""
+_finite = finiteness(Wrench)
+
+
+class Fault(NamedTuple):
+    """What noise, drift and offset add to a reading: force in N, moment in N m."""
+
+    f: Vector
+    m: Vector
 
 
 @compiled
-def _cross(a: Floats, b: Floats) -> Floats:
-    c = np.empty(3)
-    c[0] = a[1] * b[2] - a[2] * b[1]
-    c[1] = a[2] * b[0] - a[0] * b[2]
-    c[2] = a[0] * b[1] - a[1] * b[0]
-    return c
+def shaft_motion(
+    R_WM: np.ndarray, p_WM: Numbers, v_WM: Numbers, w_WM: Numbers
+) -> tuple[ShaftMotion]:
+    """The shaft of a mount M, whose z axis it is."""
+    u = xyz(R_WM[:, 2], 0)
+    return (ShaftMotion(xyz(p_WM, 0), u, xyz(v_WM, 0), cross(w_WM, u)),)
 
 
 @compiled
-def shaft_of(R_WM: Floats, p_WM: Floats, v_WM: Floats, w_WM: Floats) -> Floats:
-    """p_WS, u, v_WS, du/dt (12) of a mount M whose z axis is the shaft."""
-    shaft = np.empty(12)
-    shaft[0:3] = p_WM
-    shaft[3:6] = R_WM[:, 2]
-    shaft[6:9] = v_WM
-    shaft[9:12] = _cross(w_WM, shaft[3:6])
-    return shaft
+def _less_turned(a: Vector, R: np.ndarray, b: Vector) -> Vector:
+    """The difference a - R b."""
+    for j in range(3):
+        a = along(a, -b[j], R[:, j])
+    return a
 
 
 @compiled
 def wall_wrench(
-    R_WM: Floats,
-    shaft: Floats,
-    w: Floats,
-    alpha: Floats,
-    a: Floats,
-    force: Floats,
-    moment: Floats,
-    fault: Floats,
-    body: Floats,
-    limit: Floats,
-    sleeve: Floats,
-) -> Floats:
-    """What the wall does to the shaft, in W.
+    params: Any,
+    R_WM: np.ndarray,
+    shaft: ShaftMotion,
+    w: Numbers,
+    alpha: Numbers,
+    a: Numbers,
+    force: Numbers,
+    moment: Numbers,
+    fault: Fault,
+    p_WC: Numbers,
+    a_WC: Numbers,
+) -> tuple[Wrench]:
+    """What the wall does to the shaft, in W, about the sensor's origin.
 
     Args:
+        params: A record: `mass` [kg] of the instrument, distance of its `centre` [m],
+            its transverse `inertia` about the sensor [kg m^2]; `force_range` [N] and
+            `moment_range` [N m] of an axis; `sleeve_mass` [kg], 0 for no sleeve.
         R_WM: Orientation of the mount.
-        shaft: p_WS, u, v_WS, du (12).
-        w: Angular velocity (3).
-        alpha: Angular acceleration (3).
-        a: Acceleration of the sensor (3).
-        force: Ideal reading, in M (3).
-        moment: Ideal reading, in M (3).
-        fault: What noise, drift and offset add to it (6).
-        body: Mass [kg], distance of the centre [m] and transverse inertia about
-            the sensor [kg m^2] of the instrument.
-        limit: Ranges of a force and a moment axis.
-        sleeve: Mass [kg] of the sleeve, its place and its acceleration (7).
+        shaft: The sensor's origin S and the shaft.
+        w: Angular velocity of the mount.
+        alpha: Its angular acceleration.
+        a: Acceleration of S.
+        force: Ideal reading, in M.
+        moment: Ideal reading, in M.
+        fault: What is added to it.
+        p_WC: Place of the sleeve.
+        a_WC: Its acceleration.
 
     Returns:
-        f (3), m (3) about the sensor's origin, and 1; zeros while saturated.
+        The wrench; silence while an axis is saturated.
     """
-    result = np.zeros(7)
-    read = np.empty(6)
+    f_M, m_M = plus(force, fault.f), plus(moment, fault.m)
     for i in range(3):
-        read[i] = force[i] + fault[i]
-        read[3 + i] = moment[i] + fault[3 + i]
-        if not (abs(read[i]) <= limit[0] and abs(read[3 + i]) <= limit[1]):
-            return result  # a NaN is not in range either
-    u = shaft[3:6]
-    ddu = _cross(alpha, u) + _cross(w, shaft[9:12])
-    b = a.copy()
-    b[2] += _GRAVITY
-    s = body[2] * ddu + body[0] * body[1] * b
-    f = body[0] * (b + body[1] * ddu)
-    m = _cross(u, s)
-    if sleeve[0] > 0.0:
-        inertia = sleeve[0] * sleeve[4:7]
-        f += inertia
-        m += _cross(sleeve[1:4] - shaft[0:3], inertia)
-    for i in range(3):
-        for j in range(3):
-            f[i] -= R_WM[i, j] * read[j]
-            m[i] -= R_WM[i, j] * read[3 + j]
-    result[0:3], result[3:6], result[6] = f, m, 1.0
-    return result if isfinite(f.sum() + m.sum()) else np.zeros(7)
+        in_range = abs(f_M[i]) <= params.force_range
+        if not (in_range and abs(m_M[i]) <= params.moment_range):
+            return (SILENCE,)  # a NaN is not in range either
+    mass, centre = params.mass, params.centre
+    ddu = plus(cross(alpha, shaft.u), cross(w, shaft.du))
+    felt = plus(a, (0.0, 0.0, _GRAVITY))  # a - g
+    f = scaled(mass, along(felt, centre, ddu))
+    m = cross(shaft.u, along(scaled(params.inertia, ddu), mass * centre, felt))
+    if params.sleeve_mass > 0.0:
+        inertia = scaled(params.sleeve_mass, a_WC)
+        f = plus(f, inertia)
+        m = plus(m, cross(sub(p_WC, shaft.p), inertia))
+    wrench = Wrench(_less_turned(f, R_WM, f_M), _less_turned(m, R_WM, m_M), 1.0)
+    return (wrench if _finite(wrench) else SILENCE,)

@@ -9,58 +9,72 @@ nearest to a wanted one, whatever the number of discs.
 """
 
 from collections.abc import Sequence
-from math import atan2, cos, pi, sin, sqrt
+from dataclasses import dataclass
+from math import atan2, cos, inf, pi, sin, sqrt
+from typing import NamedTuple
 
 from systems.switching.fields import involute_components
 
 TWO_PI = 2.0 * pi
 
-Obstacle = tuple[float, float, float, float, float, float]
-"""Track identity, x, y, radius [m], velocity v_x, v_y [m/s]."""
 
-Arc = tuple[float, float, Obstacle]
+@dataclass(slots=True)
+class Disc:
+    """An obstacle relative to the body, which meets it with v - w.
+
+    Not a tuple: a step reads fields hundreds of times, and a slot is read at once.
+    """
+
+    track: float
+    q_x: float  # the body's place less the centre's, m
+    q_y: float
+    radius: float  # m
+    w_x: float  # its velocity, m/s
+    w_y: float
+
+
+Arc = tuple[float, float, Disc]
 """First heading [rad], width [rad] counter-clockwise, and whose arc it is.
 
 At the first (rightmost) heading the body passes the disc on its left, which
 is the counter-clockwise side, +1; at the last one on its right, -1.
 """
 
-Choice = tuple[float, float, float, Obstacle | None, float]
-"""Cost, heading, turn away from the wanted heading [rad], obstacle and side."""
+
+class Choice(NamedTuple):
+    """A free heading."""
+
+    heading: float  # rad
+    turn: float  # away from the wanted heading, rad
+    disc: Disc | None  # whose arc ends there
+    side: float
 
 
 def time_to_enter(
-    px: float,
-    py: float,
-    vx: float,
-    vy: float,
-    obstacles: Sequence[Obstacle],
-    clearance: float,
+    vx: float, vy: float, discs: Sequence[Disc], clearance: float
 ) -> float:
-    """Time until a body enters the safety circle of an obstacle [s].
+    """Time until the body enters the safety circle of an obstacle [s].
 
     Args:
-        px: Body's place, x [m].
-        py: Body's place, y [m].
-        vx: Its velocity, x [m/s].
-        vy: Its velocity, y [m/s].
-        obstacles: The discs, which keep their velocities.
+        vx: The body's velocity, x [m/s].
+        vy: The same, y [m/s].
+        discs: The obstacles, which keep their velocities.
         clearance: What a safety circle has beyond the disc's radius [m].
 
     Returns:
         The least time; zero within a circle if moving inwards; infinite if
         none is entered.
     """
-    first = float("inf")
-    for _, x, y, radius, wx, wy in obstacles:
-        qx = px - x
-        qy = py - y
-        ux = vx - wx
-        uy = vy - wy
+    first = inf
+    for disc in discs:
+        qx = disc.q_x
+        qy = disc.q_y
+        ux = vx - disc.w_x
+        uy = vy - disc.w_y
         b = qx * ux + qy * uy
         if b >= 0.0:
             continue
-        rho = radius + clearance
+        rho = disc.radius + clearance
         c = qx * qx + qy * qy - rho * rho
         if c <= 0.0:
             return 0.0
@@ -74,36 +88,30 @@ def time_to_enter(
 
 
 def blocked_arcs(
-    px: float,
-    py: float,
-    speed: float,
-    obstacles: Sequence[Obstacle],
-    clearance: float,
-    horizon: float,
+    speed: float, discs: Sequence[Disc], clearance: float, horizon: float
 ) -> list[Arc]:
     """The arcs of headings that lead into the obstacles' safety circles.
 
     Args:
-        px: Body's place, x [m].
-        py: Body's place, y [m].
-        speed: Its speed [m/s], > 0.
-        obstacles: The discs, which keep their velocities.
+        speed: The body's [m/s], > 0.
+        discs: The obstacles, which keep their velocities.
         clearance: What a safety circle has beyond the disc's radius [m].
         horizon: Discs that cannot be met within this time [s] have no arc.
     """
     arcs: list[Arc] = []
     vv = speed * speed
-    for obstacle in obstacles:
-        _, x, y, radius, wx, wy = obstacle
-        qx = px - x
-        qy = py - y
+    for disc in discs:
+        qx = disc.q_x
+        qy = disc.q_y
+        wx = disc.w_x
+        wy = disc.w_y
         d = sqrt(qx * qx + qy * qy)
         nx = qx / d
         ny = qy / d
-        rho = radius + clearance
+        rho = disc.radius + clearance
         ww = wx * wx + wy * wy
         if ww > 0.98 * vv:
-            arcs.extend(_arcs_of_fast(obstacle, d, nx, ny, rho, speed, horizon))
+            arcs.extend(_arcs_of_fast(disc, d, nx, ny, rho, speed, horizon))
             continue
         # Velocities w + s e of size v, for a relative heading e, here e = -n.
         k = wx * nx + wy * ny
@@ -132,12 +140,12 @@ def blocked_arcs(
         k = ex * wx + ey * wy
         s = sqrt(k * k + vv - ww) - k
         last = atan2(wy + s * ey, wx + s * ex)
-        arcs.append((first, (last - first) % TWO_PI, obstacle))
+        arcs.append((first, (last - first) % TWO_PI, disc))
     return arcs
 
 
 def _arcs_of_fast(
-    obstacle: Obstacle,
+    disc: Disc,
     d: float,
     nx: float,
     ny: float,
@@ -149,7 +157,7 @@ def _arcs_of_fast(
 
     Each edge of the cone may then be met at two headings or at none.
     """
-    wx, wy = obstacle[4], obstacle[5]
+    wx, wy = disc.w_x, disc.w_y
     ww = wx * wx + wy * wy
     if d - rho > horizon * (sqrt(ww) + speed):
         return []
@@ -184,7 +192,7 @@ def _arcs_of_fast(
             ux = speed * cos(middle) - wx
             uy = speed * sin(middle) - wy
             if ux * nx + uy * ny < out * sqrt(ux * ux + uy * uy):
-                arcs.append((before, width, obstacle))
+                arcs.append((before, width, disc))
         before = edge
     return arcs
 
@@ -222,15 +230,15 @@ def nearest_free(
     Returns:
         The choice, or None if every heading is blocked.
     """
-    best: Choice | None = None
+    best, chosen = inf, None
     for sign in (1.0, -1.0):
         heading = wanted
         turn = 0.0
-        edge: Obstacle | None = None
+        edge: Disc | None = None
         moved = True
         while moved and turn < TWO_PI:
             moved = False
-            for first, width, obstacle in arcs:
+            for first, width, disc in arcs:
                 if sign > 0.0:  # how far to the right its first heading lies
                     step = (heading - first) % TWO_PI
                 else:
@@ -238,7 +246,7 @@ def nearest_free(
                 if 1e-9 < step < width - 1e-9 or step < width >= TWO_PI:
                     heading -= sign * step
                     turn += step
-                    edge = obstacle
+                    edge = disc
                     moved = True
                     if width >= TWO_PI:
                         turn = TWO_PI
@@ -246,11 +254,11 @@ def nearest_free(
             continue
         cost = turn
         if edge is not None:
-            across = edge[5] * cos(wanted) - edge[4] * sin(wanted)
+            across = edge.w_y * cos(wanted) - edge.w_x * sin(wanted)
             cost -= behind_bias * sign * across / speed
-            if edge[0] == track and sign == side:
+            if edge.track == track and sign == side:
                 cost -= hysteresis
             cost += commitment * abs((heading - last + pi) % TWO_PI - pi)
-        if best is None or cost < best[0]:
-            best = (cost, heading, turn, edge, sign)
-    return best
+        if cost < best:
+            best, chosen = cost, (heading, turn, edge, sign)
+    return Choice(*chosen) if chosen else None

@@ -10,21 +10,19 @@ That distance falls from group to group, so that the walk ends.
 """
 
 from collections.abc import Sequence
-from math import atan2, hypot, inf, pi, sqrt
+from math import atan2, inf, pi, sqrt
 
-from systems.switching.arcs import TWO_PI, Obstacle, time_to_enter
+from systems.switching.arcs import TWO_PI, Disc, time_to_enter
 from systems.switching.fields import involute_field
 
-Follow = tuple[float, float, Obstacle, float]
+Follow = tuple[float, float, Disc, float]
 """Unit direction x, y of the way, the member it follows, its straight part [m]."""
 
 
 def way_round(
-    px: float,
-    py: float,
-    member: Obstacle,
+    member: Disc,
     side: float,
-    standing: Sequence[Obstacle],
+    standing: Sequence[Disc],
     clearance: float,
     look_ahead: float,
     spare: float,
@@ -32,8 +30,6 @@ def way_round(
     """The direction that keeps a group on one side of the body.
 
     Args:
-        px: Body's place, x [m].
-        py: Body's place, y [m].
         member: Member of the group followed so far.
         side: +1 keeps the group on the left, -1 on the right.
         standing: All standing obstacles in sight.
@@ -47,23 +43,22 @@ def way_round(
     """
     ex = ey = straight = 0.0
     for _ in range(len(standing) + 1):
-        _, x, y, radius, _, _ = member
-        rho = radius + clearance
-        qx, qy = px - x, py - y
+        rho = member.radius + clearance
+        qx, qy = member.q_x, member.q_y
         ex, ey = involute_field(qx, qy, rho, side)
         straight = sqrt(max(qx * qx + qy * qy - rho * rho, 0.0))
         reach = max(straight, look_ahead)
         following = None
         most = 1e-6
         for other in standing:
-            touch = rho + other[3] + clearance + spare
-            ax, ay = other[1] - x, other[2] - y
+            touch = rho + other.radius + clearance + spare
+            ax, ay = qx - other.q_x, qy - other.q_y
             if ax * ax + ay * ay >= touch * touch or other is member:
                 continue
-            if time_to_enter(px, py, ex, ey, (other,), clearance + spare) > reach:
+            if time_to_enter(ex, ey, (other,), clearance + spare) > reach:
                 continue
             # Hand over to the member that turns the way most from the group.
-            away, _, _ = _turn(px, py, ex, ey, other, clearance + spare, side)
+            away, _, _ = _turn(ex, ey, other, clearance + spare, side)
             if away > most:
                 most, following = away, other
         if following is None:
@@ -73,69 +68,60 @@ def way_round(
 
 
 def _turn(
-    px: float,
-    py: float,
     ex: float,
     ey: float,
-    other: Obstacle,
+    other: Disc,
     clearance: float,
     side: float,
 ) -> tuple[float, float, float]:
     """How far [rad] the way past another disc turns from the way e, and that way."""
-    fx, fy = involute_field(px - other[1], py - other[2], other[3] + clearance, side)
+    rho = other.radius + clearance
+    fx, fy = involute_field(other.q_x, other.q_y, rho, side)
     away = atan2(-side * (ex * fy - ey * fx), ex * fx + ey * fy) % TWO_PI
     return (away if away < 1.5 * pi else 0.0), fx, fy
 
 
 def free_range(
-    px: float,
-    py: float,
     gx: float,
     gy: float,
-    standing: Sequence[Obstacle],
+    standing: Sequence[Disc],
     clearance: float,
     vision: float,
 ) -> float:
     """Free length of the ray from the body in unit direction g, as seen [m].
 
     Args:
-        px: Body's place, x [m].
-        py: Body's place, y [m].
         gx: Direction, x.
         gy: Direction, y.
         standing: Standing obstacles in sight.
         clearance: What a safety circle has beyond the disc's radius [m].
         vision: Radius of sight [m]; a disc whose centre is beyond is not seen.
     """
-    largest = max((o[3] for o in standing), default=0.0)
+    largest = max((o.radius for o in standing), default=0.0)
     seen = max(vision - largest - clearance, 0.0)
-    return min(time_to_enter(px, py, gx, gy, standing, clearance), seen)
+    return min(time_to_enter(gx, gy, standing, clearance), seen)
 
 
 def first_on_ray(
-    px: float,
-    py: float,
     gx: float,
     gy: float,
-    standing: Sequence[Obstacle],
+    standing: Sequence[Disc],
     clearance: float,
-) -> Obstacle | None:
+) -> Disc | None:
     """The standing obstacle whose safety circle a ray enters first."""
     first, found = inf, None
-    for obstacle in standing:
-        t = time_to_enter(px, py, gx, gy, (obstacle,), clearance)
+    for disc in standing:
+        t = time_to_enter(gx, gy, (disc,), clearance)
         if t < first:
-            first, found = t, obstacle
+            first, found = t, disc
     return found
 
 
 def shorter_side(
-    px: float,
-    py: float,
     gx: float,
     gy: float,
-    member: Obstacle,
-    standing: Sequence[Obstacle],
+    member: Disc,
+    standing: Sequence[Disc],
     clearance: float,
     look_ahead: float,
     spare: float,
@@ -146,16 +132,10 @@ def shorter_side(
     Arguments as of `way_round`; the goal lies in unit direction g, and `kept` is
     the advantage [rad] of the counter-clockwise side.
     """
-    turns = []
-    for side in (1.0, -1.0):
-        ex, ey, _, _ = way_round(
-            px, py, member, side, standing, clearance, look_ahead, spare
-        )
-        turn = atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI
-        turns.append(turn if turn < 1.5 * pi else 0.0)
-    return 1.0 if turns[0] - turns[1] <= kept else -1.0
 
+    def turn(side: float) -> float:
+        ex, ey, _, _ = way_round(member, side, standing, clearance, look_ahead, spare)
+        angle = atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI
+        return angle if angle < 1.5 * pi else 0.0
 
-def near(ax: float, ay: float, bx: float, by: float, distance: float) -> bool:
-    """Whether two places are nearer than a distance [m]."""
-    return hypot(ax - bx, ay - by) < distance
+    return 1.0 if turn(1.0) - turn(-1.0) <= kept else -1.0

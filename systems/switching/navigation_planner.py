@@ -1,76 +1,103 @@
 """The base of the mobile robot's planners: their ports, and what they hold."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from math import cos, isfinite, sin
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
-from systems.switching.arcs import Obstacle
-from systems.switching.signals import (
-    GOAL_EXAMPLE,
-    ROBOT_EXAMPLE,
-    seen_example,
-    tracks,
-)
+from systems.common.compiled import compiled
+from systems.common.signal import reader, size
+from systems.switching.signals import SEEN, Goal, Mode, PlanarVelocity, Seen
 
 PERIOD = 0.05
 """Of all planners, in s."""
+
+SEEN_SIZE = size(Seen)
+read_seen = reader(Seen)
+
+
+class Planned(NamedTuple):
+    """What is held until the next step: velocity, mode, and the planner's memory."""
+
+    v_R: PlanarVelocity
+    mode: Mode
+    memory: Sequence[Any] = ()
+
+
+@compiled
+def in_sight(
+    robot: np.ndarray, goal: np.ndarray, seen: np.ndarray
+) -> tuple[bool, np.ndarray]:
+    """Whether all numbers are finite; the rows of `Seen` that hold an obstacle."""
+    rows = seen.reshape((len(seen) // SEEN_SIZE, SEEN_SIZE))
+    there, count = np.empty_like(rows), 0
+    for k in range(len(rows)):
+        if read_seen(rows[k]).track >= 0.0:
+            there[count] = rows[k]
+            count += 1
+    return isfinite(robot.sum() + goal.sum() + seen.sum()), there[:count]
 
 
 class NavigationPlanner(Block):
     """A planner that takes a velocity every period and holds it in between.
 
-    Its state begins with that velocity.
+    Where an input is not finite, the robot is to stand.
     """
 
-    def declare(
-        self,
-        state: Sequence[float],
-        mode: Callable[[list[float]], Sequence[float]],
-        capacity: int,
-        period: float,
-    ) -> None:
+    def declare(self, period: float, *memory: Any) -> None:
         """Declares ports, state and update.
 
         Args:
-            state: What is held at first: the velocity (2), and the planner's own.
-            mode: Port ``mode``'s value (5) from what is held.
-            capacity: Obstacles in sight at most.
             period: In s.
+            memory: What the planner remembers at first: named tuples of numbers.
         """
-        self._robot = self.vector_in("robot", ROBOT_EXAMPLE)
-        self._seen = self.vector_in("seen", seen_example(capacity))
-        self._goal = self.vector_in("goal", GOAL_EXAMPLE)
-        self._state = self.DeclareDiscreteState([*state])
-        ticket = {self.xd_ticket()}
-        self.vector_out("v_R", 2, lambda context: self._held(context)[:2], ticket)
-        self.vector_out("mode", 5, lambda context: mode(self._held(context)), ticket)
+        self._robot = self.signal_in("robot", RobotState)
+        self._seen = self.signal_in("seen", SEEN)
+        self._goal = self.signal_in("goal", Goal)
+        self.state_out("v_R", PlanarVelocity, np.zeros(size(PlanarVelocity)))
+        self._mode = self.state_out("mode", Mode, np.array(Mode()))
+        self._memory = [self.DeclareDiscreteState([*part]) for part in memory]
+        self._kinds = [PlanarVelocity, Mode, *map(type, memory)]
         self.update_every(period, self._update)
 
-    def _held(self, context: Any) -> list[float]:
-        return context.get_discrete_state(self._state).value().tolist()
+    def _update(self, context: Any) -> Sequence[Any]:
+        robot, goal = self._robot.Eval(context), self._goal.Eval(context)
+        known, there = in_sight(robot, goal, self._seen.Eval(context))
+        memory = [self._held(context, group) for group in self._memory]
+        if known:
+            planned = self.plan(
+                RobotState(*robot.tolist()),
+                Goal(*goal.tolist()),
+                [*map(Seen._make, there.tolist())],
+                *memory,
+            )
+        else:
+            mode = self._held(context, self._mode)
+            planned = Planned(PlanarVelocity(0.0, 0.0), mode, memory)
+        # Drake takes an array over ten times faster than a tuple.
+        return [*map(np.array, (planned.v_R, planned.mode, *planned.memory))]
 
-    def _update(self, context: Any) -> Sequence[float]:
-        return self.plan(
-            self._held(context),
-            self._robot.Eval(context).tolist(),
-            self._goal.Eval(context).tolist(),
-            tracks(self._seen.Eval(context).tolist()),
-        )
+    def _held(self, context: Any, group: int) -> Any:
+        return self._kinds[group](*context.get_discrete_state(group).value().tolist())
 
     @abstractmethod
     def plan(
-        self,
-        held: list[float],
-        robot: list[float],
-        goal: list[float],
-        seen: list[Obstacle],
-    ) -> Sequence[float]:
+        self, robot: RobotState, goal: Goal, seen: list[Seen], *memory: Any
+    ) -> Planned:
         """What is held from now on.
 
         Args:
-            held: What is held so far.
-            robot: The body's x, y in m, heading in rad, speed, turn rate (5).
-            goal: Its x, y in m (2).
+            robot: The body.
+            goal: Where it shall go.
             seen: The obstacles in sight.
+            *memory: What the planner remembers.
         """
+
+
+def velocity(robot: RobotState) -> tuple[float, float]:
+    """Velocity of the body [m/s]."""
+    return robot.v * cos(robot.theta), robot.v * sin(robot.theta)

@@ -1,47 +1,56 @@
-"""What stands where in the signals that the navigation blocks exchange.
+"""The signals that the navigation's blocks exchange. World frame W, plane z = 0."""
 
-`robot` (5): the body's x, y [m], heading [rad], speed [m/s], turn rate [rad/s].
-`obstacles` (5 each): x, y, radius [m], v_x, v_y [m/s]; a radius of zero is nothing.
-`seen` (6 each): track identity, x, y, radius [m], v_x, v_y [m/s]; an identity of -1
-is nothing. World frame, plane z = 0.
-"""
+from typing import Annotated, NamedTuple
 
-from collections.abc import Sequence
-from math import cos, sin
-
-from systems.switching.arcs import Obstacle
-
-CAPACITY = 24
-"""Default number of obstacles that the signals have room for."""
-
-ROBOT_EXAMPLE = [0.0, 0.0, 0.0, 0.5, 0.0]
-"""A robot that drives along x."""
-
-GOAL_EXAMPLE = [8.0, 0.0]
-"""A goal ahead of it."""
+from plants.crowd.signals import ROWS
+from systems.common.signal import Field, Many
 
 
-def obstacles_example(capacity: int) -> list[float]:
-    """One obstacle that crosses ahead of the robot, and no others."""
-    return [2.0, 0.4, 0.3, 0.0, -0.3] + [0.0] * (5 * (capacity - 1))
+class Seen(NamedTuple):
+    """An obstacle in sight."""
+
+    track: Annotated[float, Field("1", "its identity, -1 for nothing", 0.0)]
+    x: Annotated[float, Field("m", "of its centre", 2.0)]
+    y: Annotated[float, Field("m", "of its centre", 0.4)]
+    radius: Annotated[float, Field("m", "R_i", 0.3)]
+    v_x: Annotated[float, Field("m/s", "velocity", 0.0)]
+    v_y: Annotated[float, Field("m/s", "velocity", -0.3)]
 
 
-def seen_example(capacity: int) -> list[float]:
-    """The same, seen."""
-    rows = [0.0, 2.0, 0.4, 0.3, 0.0, -0.3]
-    return rows + [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0] * (capacity - 1)
+class Noise(NamedTuple):
+    """What an obstacle's measurement is wrong by, in standard deviations."""
+
+    x: Annotated[float, Field("1", "of its centre", 0.5)]
+    y: Annotated[float, Field("1", "of its centre", -0.5)]
+    v_x: Annotated[float, Field("1", "of its velocity", 0.5)]
+    v_y: Annotated[float, Field("1", "of its velocity", -0.5)]
 
 
-def tracks(seen: Sequence[float]) -> list[Obstacle]:
-    """The rows of `seen` that hold an obstacle."""
-    found: list[Obstacle] = []
-    for k in range(0, len(seen), 6):
-        track, x, y, radius, vx, vy = seen[k : k + 6]
-        if track >= 0.0:
-            found.append((track, x, y, radius, vx, vy))
-    return found
+class Goal(NamedTuple):
+    """Where the robot shall go."""
+
+    x: Annotated[float, Field("m", "place", 8.0)]
+    y: Annotated[float, Field("m", "place", 0.0)]
 
 
-def velocity(robot: Sequence[float]) -> tuple[float, float]:
-    """Velocity of the body [m/s]."""
-    return robot[3] * cos(robot[2]), robot[3] * sin(robot[2])
+class PlanarVelocity(NamedTuple):
+    """The velocity that the robot shall take."""
+
+    x: Annotated[float, Field("m/s", "velocity", 0.4)]
+    y: Annotated[float, Field("m/s", "velocity", 0.3)]
+
+
+class Mode(NamedTuple):
+    """What a planner is about."""
+
+    state: Annotated[float, Field("1", "its number in the planner's states", 0.0)] = 0.0
+    track: Annotated[float, Field("1", "obstacle followed, -1 for none", -1.0)] = -1.0
+    side: Annotated[float, Field("1", "+1 counter-clockwise about it", 1.0)] = 1.0
+    retreat: Annotated[float, Field("1", "1 if it may drive backwards", 0.0)] = 0.0
+    outrun: Annotated[
+        float, Field("1", "1 if an obstacle in sight is as fast as the body", 0.0)
+    ] = 0.0
+
+
+SEEN = Many(Seen, ROWS)
+NOISE = Many(Noise, ROWS)

@@ -10,13 +10,14 @@ meet, so that the heading never jumps.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import acos, atan2, cos, hypot, isfinite, sin
-from typing import NamedTuple
+from math import acos, atan2, cos, hypot, sin
+from typing import Any, NamedTuple
 
-from systems.switching.arcs import Obstacle
+from plants.turtlebot.turtlebot import RobotState
+from systems.common.parameter import check, parameter
 from systems.switching.fields import attractive_field, helicoid_field
-from systems.switching.navigation_planner import PERIOD, NavigationPlanner
-from systems.switching.signals import CAPACITY
+from systems.switching.navigation_planner import PERIOD, NavigationPlanner, Planned
+from systems.switching.signals import Goal, Mode, PlanarVelocity, Seen
 
 ATTRACTIVE, TO_CIRCLE, ROUND_OBSTACLE = range(3)
 STATES = ("attractive", "about Omega", "about the obstacle")
@@ -26,25 +27,14 @@ STATES = ("attractive", "about Omega", "about the obstacle")
 class StatechartParams:
     """Parameters of the statechart."""
 
-    # Radius of the body [m].
-    body_radius: float = 0.18
-    # Distance to keep from obstacles' surfaces [m].
-    margin: float = 0.15
-    # Speed of the body [m/s].
-    speed: float = 0.5
-    # Speed per distance to the goal [1/s], near the goal.
-    gain: float = 2.0
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: If one is not positive and finite.
-        """
-        for name in ("body_radius", "margin", "speed", "gain"):
-            value = getattr(self, name)
-            if not (value > 0.0 and isfinite(value)):
-                raise ValueError(f"planner: {name}={value} must be positive and finite")
+    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
+    margin: float = parameter(
+        0.15, "distance to keep from obstacles' surfaces", "m", least=0.02, most=2.0
+    )
+    speed: float = parameter(0.5, "of the body", "m/s", above=0.0, most=3.0)
+    gain: float = parameter(
+        2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
+    )
 
 
 class Manoeuvre(NamedTuple):
@@ -70,20 +60,20 @@ class Manoeuvre(NamedTuple):
 def in_tube(
     place: tuple[float, float],
     goal: tuple[float, float],
-    obstacles: Sequence[Obstacle],
+    obstacles: Sequence[Seen],
     clearance: float,
-) -> Obstacle | None:
+) -> Seen | None:
     """The nearest obstacle between body and goal whose circle their line cuts."""
-    gx, gy = goal[0] - place[0], goal[1] - place[1]
+    (px, py), (gx, gy) = place, goal
+    gx, gy = gx - px, gy - py
     length = hypot(gx, gy)
     nearest = None
     least = length
     for obstacle in obstacles:
-        _, x, y, radius, _, _ = obstacle
-        qx, qy = x - place[0], y - place[1]
+        qx, qy = obstacle.x - px, obstacle.y - py
         along = (qx * gx + qy * gy) / length
         across = (gx * qy - gy * qx) / length
-        if 0.0 < along < least and abs(across) < radius + clearance:
+        if 0.0 < along < least and abs(across) < obstacle.radius + clearance:
             nearest, least = obstacle, along
     return nearest
 
@@ -91,7 +81,7 @@ def in_tube(
 def bypass(
     place: tuple[float, float],
     goal: tuple[float, float],
-    obstacle: Obstacle,
+    obstacle: Seen,
     rho: float,
     speed: float,
 ) -> Manoeuvre:
@@ -111,9 +101,9 @@ def bypass(
         rho: Radius of its safety circle [m].
         speed: Speed v on both circles [m/s].
     """
-    px, py = place
+    (px, py), (gx, gy) = place, goal
     track, ox, oy, _, _, _ = obstacle
-    hx, hy = goal[0] - px, goal[1] - py
+    hx, hy = gx - px, gy - py
     length = hypot(hx, hy)
     hx, hy = hx / length, hy / length
     qx, qy = ox - px, oy - py
@@ -123,8 +113,8 @@ def bypass(
     a = max((qx * qx + qy * qy - rho * rho) / (2.0 * (rho - side * b)), 0.05 * rho)
     wx, wy = px + side * a * hy, py - side * a * hx
     k = rho / hypot(wx - ox, wy - oy)
-    to_goal = max(hypot(goal[0] - ox, goal[1] - oy), rho)
-    phi = atan2(goal[1] - oy, goal[0] - ox) - side * acos(rho / to_goal)
+    to_goal = max(hypot(gx - ox, gy - oy), rho)
+    phi = atan2(gy - oy, gx - ox) - side * acos(rho / to_goal)
     return Manoeuvre(
         float(TO_CIRCLE),
         track,
@@ -144,8 +134,9 @@ def bypass(
 
 def passed(m: Manoeuvre, place: tuple[float, float], x: float, y: float) -> bool:
     """Whether the body has come round to the point x, y of the safety circle."""
+    px, py = place
     ax, ay = x - m.o_x, y - m.o_y
-    bx, by = place[0] - m.o_x, place[1] - m.o_y
+    bx, by = px - m.o_x, py - m.o_y
     return m.side * (ax * by - ay * bx) >= 0.0 and ax * bx + ay * by > 0.0
 
 
@@ -154,21 +145,21 @@ def statechart_step(
     m: Manoeuvre,
     place: tuple[float, float],
     goal: tuple[float, float],
-    obstacles: Sequence[Obstacle],
+    obstacles: Sequence[Seen],
 ) -> tuple[float, float, Manoeuvre]:
     """One step of the statechart (Figure 11).
 
     Returns:
         Velocity v_x, v_y [m/s] and the new memory.
     """
-    px, py = place
-    if hypot(goal[0] - px, goal[1] - py) < 1e-9:
+    (px, py), (gx, gy) = place, goal
+    if hypot(gx - px, gy - py) < 1e-9:
         return 0.0, 0.0, Manoeuvre()
     clearance = params.body_radius + params.margin
     if m.state == ATTRACTIVE:
         obstacle = in_tube(place, goal, obstacles, clearance)
         if obstacle is not None:
-            rho = obstacle[3] + clearance
+            rho = obstacle.radius + clearance
             m = bypass(place, goal, obstacle, rho, params.speed)
     if m.state == TO_CIRCLE and passed(m, place, m.p1_x, m.p1_y):
         m = m._replace(state=float(ROUND_OBSTACLE))
@@ -179,7 +170,7 @@ def statechart_step(
     elif m.state == ROUND_OBSTACLE:
         vx, vy = helicoid_field(px - m.o_x, py - m.o_y, m.c_o)
     else:
-        vx, vy = attractive_field(px - goal[0], py - goal[1])
+        vx, vy = attractive_field(px - gx, py - gy)
         vx, vy = params.gain * vx, params.gain * vy
     scale = min(1.0, params.speed / max(hypot(vx, vy), 1e-9))
     return scale * vx, scale * vy, m
@@ -190,45 +181,30 @@ class StatechartPlanner(NavigationPlanner):
 
     Figures 11 and 12; see the module. Obstacles' velocities are ignored.
 
-    Port ``robot`` accepts the body's x, y, heading, speed and turn rate (5).
-    Port ``seen`` accepts the obstacles in sight: track identity, x, y, radius, v_x,
-    v_y of each (6 each; identity -1 for none).
-    Port ``goal`` accepts the goal x, y in m (2).
-    Port ``v_R`` emits the velocity to take in m/s, world frame (2).
-    Port ``mode`` emits the state's number in `STATES`, the obstacle followed (-1 for
-    none), the sense about it (+1 counter-clockwise), 0 and 0 (5).
+    Port ``robot`` accepts the `RobotState`.
+    Port ``seen`` accepts rows of `Seen`.
+    Port ``goal`` accepts the `Goal`.
+    Port ``v_R`` emits the `PlanarVelocity` to take.
+    Port ``mode`` emits the `Mode`; its states are `STATES`.
     """
 
     def __init__(
-        self,
-        params: StatechartParams | None = None,
-        capacity: int = CAPACITY,
-        period: float = PERIOD,
+        self, params: StatechartParams | None = None, period: float = PERIOD
     ) -> None:
         """Makes the block.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
         self.params = params or StatechartParams()
-        self.params.check()
-        self.declare(
-            [0.0, 0.0, *Manoeuvre()],
-            lambda held: [*held[2:5], 0.0, 0.0],
-            capacity,
-            period,
-        )
+        check(self.params)
+        self.declare(period, Manoeuvre())
 
     def plan(
-        self,
-        held: list[float],
-        robot: list[float],
-        goal: list[float],
-        seen: list[Obstacle],
-    ) -> Sequence[float]:
-        """The velocity to take (2), then the manoeuvre."""
-        here, there = (robot[0], robot[1]), (goal[0], goal[1])
-        memory = Manoeuvre(*held[2:])
-        vx, vy, memory = statechart_step(self.params, memory, here, there, seen)
-        return [vx, vy, *memory]
+        self, robot: RobotState, goal: Goal, seen: list[Seen], *memory: Any
+    ) -> Planned:
+        """The velocity to take; remembers the manoeuvre."""
+        (m,) = memory
+        vx, vy, m = statechart_step(self.params, m, (robot.x, robot.y), goal, seen)
+        return Planned(PlanarVelocity(vx, vy), Mode(m.state, m.track, m.side), (m,))

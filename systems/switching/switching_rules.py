@@ -12,22 +12,17 @@ leaves open (senses, moving obstacles, groups, leaving) is worked out here.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import atan2, cos, hypot, isfinite, pi, sin, sqrt
-from typing import NamedTuple
 
-from systems.switching.arcs import (
-    Obstacle,
-    blocked_arcs,
-    nearest_free,
-    time_to_enter,
-)
+from systems.switching.arcs import Disc, blocked_arcs, nearest_free, time_to_enter
 from systems.switching.groups import (
     first_on_ray,
     free_range,
-    near,
     shorter_side,
     way_round,
 )
+from systems.switching.signals import Seen
 from systems.switching.switching_state import (
     ATTRACTIVE,
     BYPASS,
@@ -43,7 +38,8 @@ from systems.switching.switching_state import (
 Point = tuple[float, float]
 
 
-class Sight(NamedTuple):
+@dataclass(slots=True)
+class Sight:
     """The world as a step sees it: place, way to the goal, obstacles [m, m/s]."""
 
     px: float
@@ -51,9 +47,9 @@ class Sight(NamedTuple):
     gx: float  # unit vector to the goal
     gy: float
     distance: float  # to the goal
-    obstacles: Sequence[Obstacle]
-    standing: list[Obstacle]
-    moving: list[Obstacle]
+    discs: list[Disc]
+    standing: list[Disc]
+    moving: list[Disc]
 
 
 Step = tuple[float, float, SwitchingState]
@@ -66,7 +62,7 @@ def plan(
     place: Point,
     velocity: Point,
     goal: Point,
-    obstacles: Sequence[Obstacle],
+    obstacles: Sequence[Seen],
 ) -> Plan:
     """One step of the switching planner.
 
@@ -85,30 +81,31 @@ def plan(
         ValueError: If a number is not finite.
     """
     ahead = params.response
-    px = place[0] + ahead * velocity[0]
-    py = place[1] + ahead * velocity[1]
-    gx = goal[0] - px
-    gy = goal[1] - py
+    (px, py), (vx, vy), (gx, gy) = place, velocity, goal
+    px, py = px + ahead * vx, py + ahead * vy
+    gx, gy = gx - px, gy - py
     if not isfinite(gx + gy):
         raise ValueError(f"place={place}, velocity={velocity}, goal={goal}: not finite")
     distance = hypot(gx, gy)
     if distance < 1e-9:
         return Plan(0.0, 0.0, SwitchingState())
-    standing: list[Obstacle] = []
-    moving: list[Obstacle] = []
+    standing: list[Disc] = []
+    moving: list[Disc] = []
     slow = params.standing_speed**2
-    fastest = 0.0
-    for obstacle in obstacles:
-        track, x, y, radius, wx, wy = obstacle
+    fastest = total = 0.0
+    for track, x, y, radius, wx, wy in obstacles:
         ww = wx * wx + wy * wy
-        if not isfinite(x + y + radius + ww):
-            raise ValueError(f"obstacle {obstacle}: not finite")
+        total += x + y + radius + ww
         if ww > slow:
-            moving.append((track, x + ahead * wx, y + ahead * wy, radius, wx, wy))
+            qx, qy = px - (x + ahead * wx), py - (y + ahead * wy)
+            moving.append(Disc(track, qx, qy, radius, wx, wy))
             if ww > fastest:
                 fastest = ww
         else:
-            standing.append((track, x, y, radius, 0.0, 0.0))
+            standing.append(Disc(track, px - x, py - y, radius, 0.0, 0.0))
+    if not isfinite(total):
+        lost = [obstacle for obstacle in obstacles if not isfinite(sum(obstacle))]
+        raise ValueError(f"obstacles {lost}: not finite")
     sight = Sight(
         px,
         py,
@@ -125,7 +122,7 @@ def plan(
     retreat = False
     if moving:
         clearance = params.body_radius + params.margins[0]
-        meets = time_to_enter(px, py, 0.0, 0.0, moving, clearance)
+        meets = time_to_enter(0.0, 0.0, moving, clearance)
         retreat = meets < params.retreat_time
     return Plan(vx, vy, state, fastest >= params.speed**2, retreat)
 
@@ -136,13 +133,21 @@ def _step(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
         return _follow_group(params, state, sight)
     if state.mode == LEAVE and _leaves_straight(params, state, sight):
         return (*_to_goal(params, sight, params.speed), state)
-    px, py, gx, gy, distance, obstacles, _, _ = sight
-    speed = params.speed
     clearance = params.body_radius + params.margins[0]
-    enters = time_to_enter(px, py, speed * gx, speed * gy, obstacles, clearance)
-    if enters >= min(params.horizon, distance / speed):
-        return (*_to_goal(params, sight, speed), SwitchingState(best=state.best))
+    if _is_clear(params, sight, params.speed, clearance):
+        if state.mode != ATTRACTIVE:
+            state = SwitchingState(best=state.best)
+        return (*_to_goal(params, sight, params.speed), state)
     return _bypass(params, state, sight)
+
+
+def _is_clear(
+    params: SwitchingParams, sight: Sight, speed: float, clearance: float
+) -> bool:
+    """Whether the straight way to the goal enters no safety circle."""
+    vx, vy = speed * sight.gx, speed * sight.gy
+    enters = time_to_enter(vx, vy, sight.discs, clearance)
+    return enters >= min(params.horizon, sight.distance / speed)
 
 
 def _to_goal(params: SwitchingParams, sight: Sight, speed: float) -> Point:
@@ -153,37 +158,37 @@ def _to_goal(params: SwitchingParams, sight: Sight, speed: float) -> Point:
 
 def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
     """The free field nearest to the goal's, with the widest margin that leaves one."""
-    px, py, gx, gy, distance, obstacles, standing, moving = sight
-    wanted = atan2(gy, gx)
+    standing, moving = sight.standing, sight.moving
+    wanted = atan2(sight.gy, sight.gx)
     rungs = [(margin, params.speed) for margin in params.margins]
     rungs += [(params.margins[-1], f * params.speed) for f in params.slower]
-    close = min(params.standing_horizon * params.speed, distance)
+    close = min(params.standing_horizon * params.speed, sight.distance)
     trapped = False
     commitment = params.commitment if state.mode in (BYPASS, YIELD) else 0.0
     memory = (params.hysteresis, state.track, state.side, commitment, state.heading)
-    for margin, speed in rungs:
+    for rung, (margin, speed) in enumerate(rungs):
         clearance = params.body_radius + margin
         if margin == params.margins[-1]:
             clearance += 0.5 * params.closed_gap
-        arcs = blocked_arcs(px, py, speed, standing, clearance, close / speed)
+        arcs = blocked_arcs(speed, standing, clearance, close / speed)
         if arcs:
             choice = nearest_free(arcs, wanted, speed, 0.0, *memory)
-            if choice is None or choice[2] > params.trap_turn:
+            if choice is None or choice.turn > params.trap_turn:
                 trapped = True
                 continue
         full = speed == params.speed
-        enters = time_to_enter(px, py, speed * gx, speed * gy, obstacles, clearance)
-        if enters >= min(params.horizon, distance / speed):
+        # On the first rung it is not: that is why it comes here.
+        if rung and _is_clear(params, sight, speed, clearance):
             mode = ATTRACTIVE if full else YIELD
             new = SwitchingState(mode, best=state.best)
             return (*_to_goal(params, sight, speed), new)
-        arcs += blocked_arcs(px, py, speed, moving, clearance, params.horizon)
+        arcs += blocked_arcs(speed, moving, clearance, params.horizon)
         choice = nearest_free(arcs, wanted, speed, params.behind_bias, *memory)
         if choice is not None:
-            _, heading, _, edge, side = choice
+            heading, edge = choice.heading, choice.disc
             mode = BYPASS if full else YIELD
-            track = edge[0] if edge is not None else -1.0
-            new = SwitchingState(mode, track, side, state.best, heading=heading)
+            track = edge.track if edge is not None else -1.0
+            new = SwitchingState(mode, track, choice.side, state.best, heading=heading)
             return speed * cos(heading), speed * sin(heading), new
     if trapped:
         met = _meet_group(params, state, sight)
@@ -196,17 +201,15 @@ def _meet_group(
     params: SwitchingParams, state: SwitchingState, sight: Sight
 ) -> SwitchingState | None:
     """Begins to follow the group that stands on the ray to the goal, if any."""
-    px, py, gx, gy, distance, _, standing, _ = sight
+    gx, gy, distance, standing = sight.gx, sight.gy, sight.distance, sight.standing
     clearance = params.body_radius + params.margins[-1]
     wide = clearance + 0.5 * params.closed_gap
-    member = first_on_ray(px, py, gx, gy, standing, wide)
+    member = first_on_ray(gx, gy, standing, wide)
     if member is None:
         return None
     # The side of a bypass that has begun is kept unless it is much longer.
     kept = state.side * pi / 2.0 if state.mode == BYPASS else 0.0
     side = shorter_side(
-        px,
-        py,
         gx,
         gy,
         member,
@@ -216,29 +219,28 @@ def _meet_group(
         params.closed_gap,
         kept,
     )
-    free = free_range(px, py, gx, gy, standing, wide, params.vision)
-    return SwitchingState(GROUP, member[0], side, min(distance - free, state.best))
+    free = free_range(gx, gy, standing, wide, params.vision)
+    return SwitchingState(GROUP, member.track, side, min(distance - free, state.best))
 
 
 def _follow_group(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
     """Follows the group's boundary until the goal's ray leads nearer than ever."""
-    px, py, gx, gy, distance, _, standing, moving = sight
+    gx, gy, distance = sight.gx, sight.gy, sight.distance
+    standing, moving = sight.standing, sight.moving
     clearance = params.body_radius + params.margins[-1]
     wide = clearance + 0.5 * params.closed_gap
     # What stands near the group's boundary is passed with half the margin.
     narrow = params.body_radius + 0.5 * params.margins[-1]
-    member = next((o for o in standing if o[0] == state.track), None)
+    member = next((o for o in standing if o.track == state.track), None)
     if member is None:  # out of sight
         return _step(params, SwitchingState(best=state.best), sight)
-    free = free_range(px, py, gx, gy, standing, wide, params.vision)
+    free = free_range(gx, gy, standing, wide, params.vision)
     if (
         free > min(distance, params.body_radius)
         and distance - free < state.best - params.leave_gain
     ):
         return _step(params, SwitchingState(LEAVE, best=distance - free), sight)
     ex, ey, member, straight = way_round(
-        px,
-        py,
         member,
         state.side,
         standing,
@@ -246,52 +248,54 @@ def _follow_group(params: SwitchingParams, state: SwitchingState, sight: Sight) 
         params.body_radius,
         params.closed_gap,
     )
-    state = _count_laps(state._replace(track=member[0]), px, py, member, clearance)
+    state = _count_laps(state._replace(track=member.track), sight, member, clearance)
     if state.mode == UNREACHABLE:
         ex = ey = 0.0
     speed = params.speed
     vx, vy = speed * ex, speed * ey
     ahead = min(max(straight / speed, 0.3), 1.0)
     if (
-        time_to_enter(px, py, vx, vy, moving, clearance) >= params.horizon
-        and time_to_enter(px, py, vx, vy, standing, narrow) >= ahead
+        time_to_enter(vx, vy, moving, clearance) >= params.horizon
+        and time_to_enter(vx, vy, standing, narrow) >= ahead
     ):
         return vx, vy, state
-    arcs = blocked_arcs(px, py, speed, moving, clearance, params.horizon)
-    arcs += blocked_arcs(px, py, speed, standing, narrow, ahead)
+    arcs = blocked_arcs(speed, moving, clearance, params.horizon)
+    arcs += blocked_arcs(speed, standing, narrow, ahead)
     wanted = atan2(ey, ex)
     choice = nearest_free(arcs, wanted, speed, params.behind_bias, 0.0, -1.0, 1.0)
     if choice is None:
         return _least_bad(params, state, sight, wanted)
-    return speed * cos(choice[1]), speed * sin(choice[1]), state
+    return speed * cos(choice.heading), speed * sin(choice.heading), state
 
 
 def _leaves_straight(
     params: SwitchingParams, state: SwitchingState, sight: Sight
 ) -> bool:
     """Whether the body may go on straight to the place for which it left a group."""
-    px, py, gx, gy, distance, _, standing, moving = sight
+    gx, gy, distance = sight.gx, sight.gy, sight.distance
+    standing, moving = sight.standing, sight.moving
     if distance <= state.best + params.leave_gain:
         return False
     clearance = params.body_radius + params.margins[-1]
     wide = clearance + 0.5 * params.closed_gap
-    if time_to_enter(px, py, gx, gy, standing, wide) < params.body_radius:
+    if time_to_enter(gx, gy, standing, wide) < params.body_radius:
         return False
     vx, vy = _to_goal(params, sight, params.speed)
-    return time_to_enter(px, py, vx, vy, moving, clearance) >= params.horizon
+    return time_to_enter(vx, vy, moving, clearance) >= params.horizon
 
 
 def _count_laps(
-    state: SwitchingState, px: float, py: float, member: Obstacle, clearance: float
+    state: SwitchingState, sight: Sight, member: Disc, clearance: float
 ) -> SwitchingState:
     """Notes that the body comes round the group; after two rounds it gives up."""
+    from_hit = hypot(sight.px - state.hit_x, sight.py - state.hit_y)
     if state.away < 0.0:
-        if near(px, py, member[1], member[2], member[3] + 1.2 * clearance):
-            return state._replace(hit_x=px, hit_y=py, away=0.0)
+        if hypot(member.q_x, member.q_y) < member.radius + 1.2 * clearance:
+            return state._replace(hit_x=sight.px, hit_y=sight.py, away=0.0)
     elif state.away == 0.0:
-        if not near(px, py, state.hit_x, state.hit_y, 3.0 * clearance):
+        if from_hit >= 3.0 * clearance:
             return state._replace(away=1.0)
-    elif near(px, py, state.hit_x, state.hit_y, clearance):
+    elif from_hit < clearance:
         laps = state.laps + 1.0
         mode = UNREACHABLE if laps >= 2.0 else GROUP
         return state._replace(away=0.0, laps=laps, mode=float(mode))
@@ -302,18 +306,16 @@ def _least_bad(
     params: SwitchingParams, state: SwitchingState, sight: Sight, wanted: float
 ) -> Step:
     """Where nothing is free: of 16 headings and rest, what meets a surface last."""
-    best = (-1.0, 0.0, 0.0)
+    latest, best = -1.0, (0.0, 0.0)
     for k in range(17):
         heading = wanted + k * pi / 8.0
         speed = params.speed if k < 16 else 0.0
         vx, vy = speed * cos(heading), speed * sin(heading)
-        t = time_to_enter(
-            sight.px, sight.py, vx, vy, sight.obstacles, params.body_radius
-        )
-        if t > best[0]:
-            best = (min(t, 0.5 * params.horizon), vx, vy)
+        t = time_to_enter(vx, vy, sight.discs, params.body_radius)
+        if t > latest:
+            latest, best = min(t, 0.5 * params.horizon), (vx, vy)
     mode = GROUP if state.mode == GROUP else YIELD
-    return best[1], best[2], state._replace(mode=float(mode))
+    return *best, state._replace(mode=float(mode))
 
 
 def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> Point:
@@ -323,7 +325,7 @@ def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> P
         return vx, vy
     ex, ey = vx / speed, vy / speed
     narrow = params.body_radius + 0.5 * params.margins[-1]
-    free = time_to_enter(sight.px, sight.py, ex, ey, sight.standing, narrow)
+    free = time_to_enter(ex, ey, sight.standing, narrow)
     limit = max(sqrt(2.0 * params.deceleration * free), 0.1 * params.speed)
     if limit >= speed:
         return vx, vy

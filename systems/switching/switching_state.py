@@ -1,8 +1,10 @@
 """The switching planner's parameters, memory and result."""
 
-from dataclasses import dataclass, field
-from math import inf, isfinite
+from dataclasses import dataclass
+from math import inf, pi
 from typing import NamedTuple
+
+from systems.common.parameter import Rules, parameter
 
 ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
 MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
@@ -13,85 +15,109 @@ MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
 class SwitchingParams:
     """Parameters of the switching planner; the defaults are a TurtleBot's."""
 
-    # Radius of the body [m].
-    body_radius: float = 0.18
-    # Speed of the body [m/s].
-    speed: float = 0.5
-    # Radius of vision R_v [m].
-    vision: float = 3.0
-    # Distances to keep from obstacles' surfaces [m], the preferred one first; the
-    # next is taken where no heading keeps the one before.
-    margins: list[float] = field(default_factory=lambda: [0.2, 0.1])
-    # Fractions of the speed to try where no heading at full speed is free.
-    slower: list[float] = field(default_factory=lambda: [0.5])
-    # The body takes this long to follow [s]: it plans from where it will be then.
-    response: float = 0.2
-    # Obstacles that cannot be met within this time [s] do not matter.
-    horizon: float = 6.0
-    # The same for obstacles that stand [s].
-    standing_horizon: float = 2.5
-    # An obstacle slower than this [m/s] stands.
-    standing_speed: float = 0.05
-    # Advantage of the obstacle and side chosen last [rad].
-    hysteresis: float = 0.3
-    # Cost of turning away from the last bypass [rad per rad].
-    commitment: float = 0.6
-    # Advantage of passing behind an obstacle of the body's own speed [rad].
-    behind_bias: float = 0.35
-    # Standing obstacles that turn the body by more than this [rad] are a trap.
-    trap_turn: float = 1.4
-    # Gaps between safety circles up to this width [m] count as closed.
-    closed_gap: float = 0.02
-    # A group is left for a place nearer to the goal than any before by this [m].
-    leave_gain: float = 0.05
-    # Deceleration that limits the speed towards standing obstacles [m/s^2].
-    deceleration: float = 0.4
-    # The body may retreat backwards from obstacles that come within this time [s].
-    retreat_time: float = 2.0
-    # Speed per distance to the goal [1/s], near the goal.
-    approach_gain: float = 2.0
+    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
+    speed: float = parameter(0.5, "of the body", "m/s", above=0.0, most=3.0)
+    vision: float = parameter(3.0, "radius of vision R_v", "m", above=0.0, most=100.0)
+    margins: list[float] = parameter(
+        [0.2, 0.1],
+        "distances to keep from obstacles' surfaces, the preferred one first; the next "
+        "is taken where no heading keeps the one before",
+        "m",
+        shape=(-1,),
+        least=0.02,
+        most=2.0,
+    )
+    slower: list[float] = parameter(
+        [0.5],
+        "fractions of the speed to try where no heading at full speed is free",
+        shape=(-1,),
+        least=0.05,
+        most=0.95,
+    )
+    response: float = parameter(
+        0.2,
+        "the body takes this long to follow: it plans from where it will be then",
+        "s",
+        least=0.0,
+        most=2.0,
+    )
+    horizon: float = parameter(
+        6.0,
+        "obstacles that cannot be met within this time do not matter",
+        "s",
+        least=1.0,
+        most=60.0,
+    )
+    standing_horizon: float = parameter(
+        2.5, "the same for obstacles that stand", "s", least=1.0, most=60.0
+    )
+    standing_speed: float = parameter(
+        0.05, "an obstacle that is slower stands", "m/s", least=0.0, most=0.5
+    )
+    hysteresis: float = parameter(
+        0.3,
+        "advantage of the obstacle and side chosen last",
+        "rad",
+        least=0.0,
+        most=1.5,
+    )
+    commitment: float = parameter(
+        0.6, "cost of turning away from the last bypass, per angle", least=0.0, most=5.0
+    )
+    behind_bias: float = parameter(
+        0.35,
+        "advantage of passing behind an obstacle of the body's own speed",
+        "rad",
+        least=0.0,
+        most=1.5,
+    )
+    trap_turn: float = parameter(
+        1.4,
+        "standing obstacles that turn the body by more than this are a trap",
+        "rad",
+        least=0.5,
+        most=pi,
+    )
+    closed_gap: float = parameter(
+        0.02,
+        "gaps between safety circles up to this width count as closed",
+        "m",
+        least=0.0,
+        most=1.0,
+    )
+    leave_gain: float = parameter(
+        0.05,
+        "a group is left for a place nearer to the goal than any before by this",
+        "m",
+        least=0.0,
+        most=1.0,
+    )
+    deceleration: float = parameter(
+        0.4,
+        "limits the speed towards standing obstacles",
+        "m/s^2",
+        above=0.0,
+        most=10.0,
+    )
+    retreat_time: float = parameter(
+        2.0,
+        "the body may retreat backwards from obstacles that come within this time",
+        "s",
+        least=0.0,
+        most=10.0,
+    )
+    approach_gain: float = parameter(
+        2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
+    )
 
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: If one is out of range; tells the range.
-        """
-        positive = [
-            *("body_radius", "speed", "vision", "horizon", "standing_horizon"),
-            *("trap_turn", "deceleration", "approach_gain"),
-        ]
-        for name in positive:
-            value = getattr(self, name)
-            if not (value > 0.0 and isfinite(value)):
-                raise ValueError(f"planner: {name}={value} must be positive and finite")
-        others = [
-            *("response", "standing_speed", "hysteresis", "commitment", "behind_bias"),
-            *("closed_gap", "leave_gain", "retreat_time"),
-        ]
-        for name in others:
-            value = getattr(self, name)
-            if not (value >= 0.0 and isfinite(value)):
-                raise ValueError(f"planner: {name}={value} must be >= 0 and finite")
-        margins = self.margins
-        if not margins or not all(m > 0.0 and isfinite(m) for m in margins):
-            raise ValueError(
-                f"planner: margins={margins} must be distances > 0 m, e.g. [0.2, 0.1]"
-            )
-        if margins != sorted(margins, reverse=True):
-            raise ValueError(
-                f"planner: margins={margins} must fall; nearest "
-                f"{sorted(margins, reverse=True)}"
-            )
-        if any(not 0.0 < f < 1.0 for f in self.slower):
-            raise ValueError(
-                f"planner: slower={self.slower} must be fractions between 0 and 1"
-            )
-        if self.vision <= self.body_radius + margins[0]:
-            raise ValueError(
-                f"planner: vision={self.vision} m must be greater than body_radius "
-                f"and the first margin together, {self.body_radius + margins[0]} m"
-            )
+    def rules(self) -> Rules:
+        """Margins fall, and the widest one lies within sight."""
+        falling = sorted(self.margins, reverse=True)
+        yield bool(self.margins), "margins", "at least one, e.g. [0.2, 0.1]"
+        yield self.margins == falling, "margins", f"falling: {falling}"
+        least = self.body_radius + self.margins[0]
+        told = f"> {least:.6g}, body_radius and the first margin together"
+        yield self.vision > least, "vision", told
 
 
 class SwitchingState(NamedTuple):

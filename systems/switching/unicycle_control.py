@@ -5,55 +5,54 @@ into the velocity's direction, no faster than it can still stop turning, and
 drives with the part of the speed that points there.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, hypot, isfinite, pi, sqrt
+from math import atan2, cos, hypot, pi, sqrt
 from typing import Any
 
-from systems.common.block import Block
-from systems.switching.signals import ROBOT_EXAMPLE
+import numpy as np
+
+from plants.turtlebot.turtlebot import Command, RobotState
+from systems.common.compiled import compiled, packed
+from systems.common.parameter import check, parameter
+from systems.common.signal import finiteness
+from systems.common.step_block import StepBlock
+from systems.switching.signals import Mode, PlanarVelocity
 
 TWO_PI = 2.0 * pi
+finite_robot = finiteness(RobotState)
+finite_velocity = finiteness(PlanarVelocity)
+finite_mode = finiteness(Mode)
 
 
 @dataclass
 class UnicycleControlParams:
     """Parameters of the control law."""
 
-    # Turn rate per heading error [1/s].
-    gain: float = 4.0
-    # Greatest speed [m/s].
-    speed: float = 0.5
-    # Greatest turn rate [rad/s].
-    turn_rate: float = 1.8
-    # Greatest turn acceleration [rad/s^2].
-    turn_acceleration: float = 3.5
-    # Heading error beyond which it drives backwards [rad].
-    backwards: float = 1.8
-
-    def check(self) -> None:
-        """Checks the values.
-
-        Raises:
-            ValueError: If one is not positive and finite.
-        """
-        for name in ("gain", "speed", "turn_rate", "turn_acceleration"):
-            value = getattr(self, name)
-            if not (value > 0.0 and isfinite(value)):
-                raise ValueError(f"{name}={value} must be positive and finite")
+    gain: float = parameter(
+        4.0, "turn rate per heading error", "1/s", above=0.0, most=20.0
+    )
+    speed: float = parameter(0.5, "greatest", "m/s", above=0.0, most=3.0)
+    turn_rate: float = parameter(1.8, "greatest", "rad/s", above=0.0, most=10.0)
+    turn_acceleration: float = parameter(
+        3.5, "greatest", "rad/s^2", above=0.0, most=50.0
+    )
+    backwards: float = parameter(
+        1.8,
+        "heading error beyond which it may drive backwards",
+        "rad",
+        least=0.5 * pi,
+        most=pi,
+    )
 
 
+@compiled
 def heading_law(
-    params: UnicycleControlParams,
-    theta: float,
-    vx: float,
-    vy: float,
-    retreat: bool = False,
-) -> tuple[float, float]:
-    """Speed [m/s] and turn rate [rad/s] towards a velocity.
+    params: Any, theta: float, vx: float, vy: float, retreat: bool
+) -> Command:
+    """Speed and turn rate towards a velocity.
 
     Args:
-        params: Parameters.
+        params: A record of `constants`.
         theta: Heading of the body [rad].
         vx: Wanted velocity, x [m/s].
         vy: Wanted velocity, y [m/s].
@@ -61,7 +60,7 @@ def heading_law(
     """
     size = hypot(vx, vy)
     if size == 0.0:
-        return 0.0, 0.0
+        return Command(0.0, 0.0)
     error = (atan2(vy, vx) - theta + pi) % TWO_PI - pi
     backwards = retreat and abs(error) > params.backwards
     if backwards:
@@ -74,37 +73,46 @@ def heading_law(
     speed = min(size, params.speed) * max(0.0, cos(error))
     if backwards:
         speed = -speed
-    return speed, turn if error >= 0.0 else -turn
+    return Command(speed, turn if error >= 0.0 else -turn)
 
 
-class UnicycleControl(Block):
+@compiled
+def _control(
+    params: Any, robot: RobotState, v: PlanarVelocity, mode: Mode
+) -> tuple[Command]:
+    if finite_robot(robot) and finite_velocity(v) and finite_mode(mode):
+        return (heading_law(params, robot.theta, v.x, v.y, mode.retreat > 0.5),)
+    return (Command(0.0, 0.0),)
+
+
+def constants(params: UnicycleControlParams) -> np.ndarray:
+    """The parameters as the compiled functions take them."""
+    check(params)
+    return packed(params)
+
+
+class UnicycleControl(StepBlock):
     """The control law of the robot, section 3.1.2 of the thesis.
 
-    Port ``robot`` accepts the body's x, y, heading, speed and turn rate (5).
-    Port ``v_R`` accepts the velocity to take in m/s, world frame (2).
-    Port ``mode`` accepts the planner's state; its fourth number tells whether the
-    body may drive backwards (5).
-    Port ``command`` emits speed in m/s and turn rate in rad/s (2).
+    Where an input is not finite, the robot is to stand.
+
+    Port ``robot`` accepts the `RobotState`.
+    Port ``v_R`` accepts the `PlanarVelocity` to take.
+    Port ``mode`` accepts the planner's `Mode`: whether to retreat backwards.
+    Port ``command`` emits the `Command`.
     """
 
     def __init__(self, params: UnicycleControlParams | None = None) -> None:
         """Makes the block.
 
         Raises:
-            ValueError: If a parameter is out of range.
+            ParameterError: If a parameter is out of range.
         """
         super().__init__()
-        self.params = params or UnicycleControlParams()
-        self.params.check()
-        self._robot = self.vector_in("robot", ROBOT_EXAMPLE)
-        self._v_R = self.vector_in("v_R", [0.4, 0.3])
-        self._mode = self.vector_in("mode", [0.0, -1.0, 1.0, 0.0, 0.0])
-        ports = (self._robot, self._v_R, self._mode)
-        inputs = {port.ticket() for port in ports}
-        self.vector_out("command", 2, self._calc_command, inputs)
-
-    def _calc_command(self, context: Any) -> Sequence[float]:
-        theta = self._robot.Eval(context).tolist()[2]
-        vx, vy = self._v_R.Eval(context).tolist()
-        retreat = self._mode.Eval(context).tolist()[3] > 0.5
-        return heading_law(self.params, theta, vx, vy, retreat)
+        self.declare_map(
+            _control,
+            [constants(params or UnicycleControlParams())],
+            {"robot": RobotState, "v_R": PlanarVelocity, "mode": Mode},
+            "command",
+            Command,
+        )

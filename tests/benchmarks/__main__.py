@@ -1,37 +1,59 @@
 """All benchmarks, side by side: `python -m tests.benchmarks`, or `make bench`."""
 
 import argparse
-import importlib
+
+from diagrams.common.scenario import nearest
+from tests.benchmarks import (
+    bypass_full_loop,
+    bypass_suite,
+    gauze_speed,
+    kinematic_scenes,
+    resection_speed,
+    snake_speed,
+    switching_suite,
+    wrist_step,
+    wrist_sweep,
+)
 
 BENCHMARKS = {
-    "speed": "tests.benchmarks.gauze_speed",
-    "scenes": "tests.benchmarks.kinematic_scenes",
-    "bypass": "tests.benchmarks.bypass_suite",
-    "bypass-loop": "tests.benchmarks.bypass_full_loop",
-    "snake": "tests.benchmarks.snake_speed",
-    "resection": "tests.benchmarks.resection_speed",
-    "switching": "tests.benchmarks.switching_suite",
-    "wrist_step": "tests.benchmarks.wrist_step",
-    "wrist": "tests.benchmarks.wrist_sweep",
+    "speed": gauze_speed,
+    "scenes": kinematic_scenes,
+    "bypass": bypass_suite,
+    "bypass-loop": bypass_full_loop,
+    "snake": snake_speed,
+    "resection": resection_speed,
+    "switching": switching_suite,
+    "wrist-step": wrist_step,
+    "wrist": wrist_sweep,
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
+
+TITLES = {
+    name: (module.__doc__ or "").partition("\n")[0]
+    for name, module in BENCHMARKS.items()
+}
 
 
 def main() -> None:
     """Runs the chosen benchmarks and prints their tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.benchmarks",
+        description="Runs benchmarks and prints their tables.",
+        epilog="\n".join(f"  {name:12} {title}" for name, title in TITLES.items()),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="all by default")
     parser.add_argument("--seed", type=int, default=1, help="of the scenes")
     parser.add_argument("--scenes", type=int, default=300, help="of each kind")
-    parser.add_argument(
-        "--only", action="append", choices=list(BENCHMARKS), help="all by default"
-    )
     arguments = parser.parse_args()
-    for name in arguments.only or BENCHMARKS:
-        module = importlib.import_module(BENCHMARKS[name])
-        print(
-            f"\n== {name}: {(module.__doc__ or '').partition(chr(10))[0]}", flush=True
-        )
-        print(module.report(arguments.seed, arguments.scenes), flush=True)
+    if arguments.scenes < 1:
+        parser.error(f"--scenes {arguments.scenes}: must be at least 1")
+    for name in arguments.names:
+        if name not in BENCHMARKS:
+            parser.error(f"NAME={name!r}: {nearest(name, BENCHMARKS)}")
+    for name in arguments.names or BENCHMARKS:
+        print(f"\n== {name}: {TITLES[name]}", flush=True)
+        print(BENCHMARKS[name].report(arguments.seed, arguments.scenes), flush=True)
 
 
 if __name__ == "__main__":

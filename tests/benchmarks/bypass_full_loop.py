@@ -1,13 +1,12 @@
 """Moving scenes in the full loop: arm, breathing, estimated fulcrum, tracker.
 
-`python -m tests.benchmarks.bypass_full_loop --scenes 100`. Scenes of the moving set are
-laid under a flat wall: turned so that both fulcrums lie in it and the robot's way hangs
-below. Of the set the first ones are taken whose start and target the arm can reach
-(tilt at most 0.6 rad). The target tool stands still and is no obstacle, and there is no
-camera in the way, as in the kinematic set; O waits until the wrist has probed the wall.
+Scenes of the moving set are laid under a flat wall: turned so that both fulcrums lie in
+it and the robot's way hangs below. Of the set the first ones are taken whose start and
+target the arm can reach (tilt at most 0.6 rad). The target tool stands still and is no
+obstacle, and there is no camera in the way, as in the kinematic set; O waits until the
+wrist has probed the wall.
 """
 
-import argparse
 from collections.abc import Iterator
 from pathlib import Path
 import tempfile
@@ -15,9 +14,9 @@ import tempfile
 import numpy as np
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.gauze.scenes import Scene, scene
+from diagrams.studies import load_scenario
 from plants.surgeon.recording import save_recording
-from tests.benchmarks.crossed_scenes import Scene, scene
 
 MAX_TILT = 0.6
 PROBING = 1.6
@@ -128,18 +127,3 @@ def rows(seed: int, count: int, settings: list[str]) -> Iterator[str]:
 def report(seed: int, scenes: int) -> str:
     """A tenth of the number of scenes, as text: each takes seconds."""
     return "\n".join(rows(seed, max(1, scenes // 10), []))
-
-
-def main() -> None:
-    """Prints the report."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--set", action="append", default=[], help="KEY=VALUE")
-    args = parser.parse_args()
-    for line in rows(args.seed, args.scenes, args.set):
-        print(line, flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,41 +1,82 @@
 """The bypass beside the paper's forms in random scenes: reached, contact, clearance.
 
-`python -m tests.benchmarks.bypass_suite --scenes 1000` prints the table. Sets: standing
-and moving obstacle (`crossed_scenes`), moving as the tracker sees it, standing on the
-target's line and leaving after 6 s, and two or three tools standing (`bypass_scenes`).
-The time ratio is the first arrival over that of
-the straight motion without O. "condition" counts the scenes in which the evasion
-condition failed at some instant, and of the contacts those among them.
+Sets: the kinds of `diagrams.gauze.scenes`, and the moving one as the tracker sees it.
+The time ratio is the first arrival over that of the straight motion without O.
+"condition" counts the scenes in which the evasion condition failed at some instant, and
+of the contacts those among them.
 """
 
-import argparse
-from collections.abc import Iterator
 from dataclasses import dataclass
 import statistics
 
 import numpy as np
 
-from systems.common.geometry import norm, sub
-from tests.benchmarks.bypass_planners import PLANNERS, Constrained, Straight
-from tests.benchmarks.bypass_scenes import blocked_scene, crowded_scene
-from tests.benchmarks.crossed_scenes import Scene, scene
-from tests.benchmarks.kinematic_loop import (
+from diagrams.gauze.kinematic_loop import (
     PLANNER_PERIOD,
     Outcome,
-    Robot,
     estimate,
     run,
 )
+from diagrams.gauze.kinematic_planners import (
+    BYPASS,
+    PLANNERS,
+    ROBOT,
+    SPEED,
+    Constrained,
+    around,
+)
+from diagrams.gauze.scenes import Scene, scene
+from systems.bypass import tool_bypass
+from systems.bypass.bypass_route import up_and_over
+from systems.bypass.obstacle_tools import Margins
+from systems.common.geometry import limited, norm, plus, scaled, sub
+from systems.common.signal import Vector
+from systems.common.signals import RobotTool
 from tests.benchmarks.tracked import tracked
 
+
+class Straight:
+    """Attraction alone, with the bypass's law of speed."""
+
+    def __init__(self) -> None:
+        self._v: Vector = (0.0, 0.0, 0.0)
+
+    def step(self, dt, robot, obstacle, target, others=()) -> Vector:
+        """The velocity of the robot's tip, see `Planner`."""
+        way = sub(target.p, robot.tip)
+        wanted = limited(scaled(BYPASS.approach_rate, way), SPEED)
+        change = limited(sub(wanted, self._v), BYPASS.max_acceleration * dt)
+        self._v = plus(self._v, change)
+        return self._v
+
+
+class RetractTurnInsert:
+    """Up and over everything, always: the complete fallback by itself."""
+
+    def __init__(self) -> None:
+        self._params = tool_bypass.constants(BYPASS)[0]
+
+    def step(self, dt, robot, obstacle, target, others=()) -> Vector:
+        """The velocity of the robot's tip, see `Planner`."""
+        tools = around(obstacle, others)
+        keep = np.full(len(tools), Margins().safe_distance + BYPASS.goal_slack)
+        direction, length = up_and_over(
+            tools, keep, ROBOT.least_insertion, robot.fulcrum, robot.tip, target.p
+        )
+        return scaled(min(SPEED, BYPASS.approach_rate * length), direction)
+
+
+ALL = {name: make for name, make in PLANNERS.items() if name != "field only"} | {
+    "straight + constraint": lambda: Constrained(Straight()),
+    "retract, turn, insert": lambda: Constrained(RetractTurnInsert()),
+}
 FIRST = {"standing": 1.0, "moving": 1.0, "tracked": 1.0, "blocked": 0.2, "crowded": 0.3}
 """The sets, and their sizes as shares of the number of scenes."""
 
-ALL = list(PLANNERS)
 CONSTRAINED = ["bypass", "field + constraint", "straight + constraint"]
 ROWS = {
-    "standing": ALL,
-    "moving": ALL,
+    "standing": list(ALL),
+    "moving": list(ALL),
     "tracked": CONSTRAINED,
     "blocked": CONSTRAINED,
     "crowded": [*CONSTRAINED, "retract, turn, insert"],
@@ -62,32 +103,24 @@ class Result:
     edge_switches: int
 
 
-def make_scene(kind: str, seed: int, number: int) -> Scene:
-    """A scene of a set."""
-    if kind == "blocked":
-        return blocked_scene(seed, number)
-    if kind == "crowded":
-        return crowded_scene(seed, number)
-    return scene("moving" if kind == "tracked" else kind, seed, number)
-
-
 def straight_time(given: Scene) -> float:
     """Time of the straight motion to within 1 mm of the target without O, s."""
-    planner, robot = Straight(), Robot()
+    planner = Straight()
     tip = given.p_WPr
     target = estimate(given.p_WPs, given.p_WPs)
     for k in range(3600):
         if norm(sub(tip, given.p_WPs)) < 1e-3:
             return k * PLANNER_PERIOD
-        v = planner.step(PLANNER_PERIOD, [*given.p_WGr, *tip], target, target)
-        tip = robot.moved(given.p_WGr, tip, v, PLANNER_PERIOD)
+        robot = RobotTool(given.p_WGr, tip)
+        v = planner.step(PLANNER_PERIOD, robot, target, target)
+        tip = ROBOT.moved(given.p_WGr, tip, v, PLANNER_PERIOD)
     return float("nan")
 
 
 def run_scene(kind: str, name: str, seed: int, number: int) -> Result:
     """Runs one planner in one scene."""
-    given = make_scene(kind, seed, number)
-    planner = PLANNERS[name]()
+    given = scene("moving" if kind == "tracked" else kind, seed, number)
+    planner = ALL[name]()
     sense = None
     if kind == "tracked":
         sense = tracked(seed, number, given.p_WGo[2])
@@ -140,37 +173,12 @@ def row(kind: str, name: str, results: list[Result]) -> str:
     )
 
 
-def rows(
-    seed: int, scenes: int, kinds: list[str], names: list[str] | None = None
-) -> Iterator[str]:
-    """The table's lines, one by one."""
-    yield HEADER
-    for kind in kinds:
-        count = max(1, round(scenes * FIRST[kind]))
-        for name in names or ROWS[kind]:
-            yield row(
-                kind, name, [run_scene(kind, name, seed, k) for k in range(count)]
-            )
-
-
 def report(seed: int, scenes: int) -> str:
     """The table of all sets and planners, as text."""
-    return "\n".join(rows(seed, scenes, list(FIRST)))
-
-
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=1000, help="of the large sets")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--set", action="append", choices=list(FIRST))
-    parser.add_argument("--planner", action="append", choices=ALL)
-    args = parser.parse_args()
-    if args.scenes < 1:
-        parser.error(f"--scenes {args.scenes}: must be at least 1")
-    for line in rows(args.seed, args.scenes, args.set or list(FIRST), args.planner):
-        print(line, flush=True)
-
-
-if __name__ == "__main__":
-    main()
+    lines = [HEADER]
+    for kind, share in FIRST.items():
+        count = max(1, round(scenes * share))
+        for name in ROWS[kind]:
+            results = [run_scene(kind, name, seed, k) for k in range(count)]
+            lines.append(row(kind, name, results))
+    return "\n".join(lines)

@@ -1,13 +1,11 @@
 """How fast the gauze delivery runs, and where its time goes.
 
-`python -m tests.benchmarks.gauze_speed` prints the real-time factor and the planner
-step of `gauze_dynamic`, and its wall time beside that of the plant alone, which is led
-along the same motion by set-points at the same rate. Timings are noisy on a machine
-that does something else: each is the median of several runs, and the ratios hold
-better than the times.
+The real-time factor and the planner step of `gauze_dynamic`, and its wall time beside
+that of the plant alone, which is led along the same motion by set-points at the same
+rate. Timings are noisy on a machine that does something else: each is the median of
+several runs, and the ratios hold better than the times.
 """
 
-import argparse
 from collections import defaultdict
 from dataclasses import dataclass
 import gc
@@ -17,15 +15,15 @@ from typing import Any
 
 import numpy as np
 from pydrake.common import RandomGenerator
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource, ZeroOrderHold
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.common.run import Run, build, rehearse, simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.common.run import Run, simulate, start
 from diagrams.common.study import cenic
 from diagrams.gauze.theatre import add_theatre
+from diagrams.studies import build, load_scenario
+from systems.common.compiled import rehearse
 from systems.common.stopwatch import STOPWATCH
 
 
@@ -46,15 +44,15 @@ class Share:
 
 def timed(system: Any, context: Any, duration: float) -> float:
     """Wall seconds per simulated second of a system's advance."""
-    rehearse(system, context, cenic(), 0.05)
-    simulator = Simulator(system, context)
-    ApplySimulatorConfig(cenic(), simulator)
+    first = start(system, cenic(), context.Clone())
+    rehearse(lambda: first.AdvanceTo(0.05))
+    simulator = start(system, cenic(), context)
     simulator.Initialize()
     STOPWATCH.reset()
     gc.disable()
-    start = perf_counter()
+    began = perf_counter()
     simulator.AdvanceTo(duration)
-    wall = perf_counter() - start
+    wall = perf_counter() - began
     gc.enable()
     return wall / duration
 
@@ -72,7 +70,7 @@ def plant_alone(scenario: Any, run: Run) -> float:
     builder = DiagramBuilder()
     plant = add_theatre(builder, scenario).systems["plant"]
     times, rows = np.unique(run.signals["time"], return_index=True)
-    posture = run.matrix("joints.posture")[rows]
+    posture = run.joints.posture.q[rows]
     states = np.hstack([posture, np.zeros_like(posture)])
     motion = PiecewisePolynomial.FirstOrderHold(times, states.T)
     source = builder.AddSystem(TrajectorySource(motion))
@@ -138,28 +136,7 @@ def summary(runs: list[Run]) -> str:
     return "\n".join(lines)
 
 
-def report(seed: int, scenes: int, name: str = "gauze_dynamic", runs: int = 5) -> str:
-    """The figures and the table.
-
-    Args:
-        seed: Of the scenario.
-        scenes: Not used: other benchmarks' number of scenes.
-        name: Of the scenario.
-        runs: How often each thing is timed.
-    """
-    done, shares = measure(load_scenario(name, seed=seed), runs)
+def report(seed: int, scenes: int) -> str:
+    """The figures and the table; `scenes` is for other benchmarks."""
+    done, shares = measure(load_scenario("gauze_dynamic", seed=seed), 5)
     return f"{summary(done)}\n\n{table(shares)}"
-
-
-def main() -> None:
-    """Prints the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenario", default="gauze_dynamic")
-    parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=1)
-    arguments = parser.parse_args()
-    print(report(arguments.seed, 0, arguments.scenario, arguments.runs))
-
-
-if __name__ == "__main__":
-    main()

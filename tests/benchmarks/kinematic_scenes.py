@@ -1,52 +1,19 @@
 """The local planner in random scenes: reached, contact, stuck.
 
-`python -m tests.benchmarks.kinematic_scenes --scenes 300 --seed 1` prints a table
-for the corrected and the printed form of the paper's method, standing and moving
-obstacle. The figures are what they are: the method has local minima.
+The corrected and the printed form of the paper's method, standing and moving obstacle.
+The figures are what they are: the method has local minima.
 """
 
-import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
 import statistics
 import time
 
-from systems.auto_guidance.backward_movement import BackwardMovementParams
-from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
-from systems.auto_guidance.go_to_target import GoToTargetParams
-from tests.benchmarks.crossed_scenes import KINDS, scene
-from tests.benchmarks.kinematic_loop import LocalPlanner, Outcome, Planner, Robot, run
+from diagrams.gauze.kinematic_loop import Outcome, Planner, run
+from diagrams.gauze.kinematic_planners import PLANNERS
+from diagrams.gauze.scenes import scene
 
-SPEED = Robot().max_speed
-
-
-def corrected() -> Planner:
-    """The blocks as they are by default, at the scenes' speed."""
-    return LocalPlanner(
-        go=GoToTargetParams(max_speed=SPEED),
-        arbiter=FuzzyArbiterParams(max_speed=SPEED),
-    )
-
-
-def printed() -> Planner:
-    """The printed equations (2), (4) and (5)."""
-    return LocalPlanner(
-        go=GoToTargetParams(form="printed", max_speed=SPEED),
-        backward=BackwardMovementParams(form="printed"),
-        arbiter=FuzzyArbiterParams(table="literal", max_speed=SPEED),
-    )
-
-
-def field_only() -> Planner:
-    """The corrected potential field alone, v_1."""
-    return LocalPlanner(go=GoToTargetParams(max_speed=SPEED), field_only=True)
-
-
-PLANNERS: dict[str, Callable[[], Planner]] = {
-    "corrected": corrected,
-    "printed": printed,
-    "field only": field_only,
-}
+CHOSEN = ("corrected field", "printed field", "field only")
 
 
 @dataclass
@@ -101,53 +68,27 @@ def tally(kind: str, make: Callable[[], Planner], scenes: int, seed: int) -> Tal
     return Tally([run(scene(kind, seed, k), make()) for k in range(scenes)])
 
 
-def table(scenes: int, seed: int, names: list[str]) -> str:
-    """The table of all kinds of scenes and the named planners, as text.
+def report(seed: int, scenes: int) -> str:
+    """The table of both kinds of scenes and the planners, as text.
 
     "passed by" counts the scenes in which the tip came within 1 mm of the target at
     all, "reached" those where it came to rest there without contact. The time is the
     median of the first arrival where reached, the clearance the median of the least.
     """
     rows = [
-        f"{'scenes':9} {'planner':11} {'n':>5} {'reached':>8} {'contact':>8} "
+        f"{'scenes':9} {'planner':15} {'n':>5} {'reached':>8} {'contact':>8} "
         f"{'(at G_O)':>8} {'stuck':>7} {'passed by':>9} {'time':>6} "
         f"{'clearance':>9} {'wall':>6}"
     ]
-    for kind in KINDS:
-        for name in names:
+    for kind in ("standing", "moving"):
+        for name in CHOSEN:
             start = time.perf_counter()
             t = tally(kind, PLANNERS[name], scenes, seed)
             wall = time.perf_counter() - start
             rows.append(
-                f"{kind:9} {name:11} {scenes:5d} {t.share('reached'):8.1%} "
+                f"{kind:9} {name:15} {scenes:5d} {t.share('reached'):8.1%} "
                 f"{t.share('contact'):8.1%} {t.contacts_at_fulcrum():8.1%} "
                 f"{t.share('stuck'):7.1%} {t.arrived():9.1%} {t.time():4.1f} s "
                 f"{1e3 * t.clearance():6.1f} mm {wall:4.0f} s"
             )
     return "\n".join(rows)
-
-
-def report(seed: int, scenes: int) -> str:
-    """The table of all planners, for `make bench`."""
-    return table(scenes, seed, list(PLANNERS))
-
-
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=300, help="of each kind")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument(
-        "--planner",
-        action="append",
-        choices=list(PLANNERS),
-        help="may be given several times; all by default",
-    )
-    args = parser.parse_args()
-    if args.scenes < 1:
-        parser.error(f"--scenes {args.scenes}: must be at least 1")
-    print(table(args.scenes, args.seed, args.planner or list(PLANNERS)))
-
-
-if __name__ == "__main__":
-    main()

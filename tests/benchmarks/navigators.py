@@ -6,8 +6,9 @@ obstacle that comes within two seconds.
 
 from importlib.util import find_spec
 
-from systems.switching.arcs import time_to_enter
+from systems.switching.arcs import Disc, time_to_enter
 from systems.switching.classical_planner import ClassicalParams, summed_fields
+from systems.switching.signals import Seen
 from systems.switching.statechart_planner import (
     Manoeuvre,
     StatechartParams,
@@ -15,8 +16,8 @@ from systems.switching.statechart_planner import (
 )
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import SwitchingParams, SwitchingState
-from tests.benchmarks.harness import Command, Planner, Seen, Step
-from tests.benchmarks.scenes import Scene
+from tests.benchmarks.navigation_loop import Command, Planner, Step
+from tests.benchmarks.navigation_scenes import Scene
 
 MARGIN = 0.1
 """Distance [m] that the peers keep from obstacles' surfaces."""
@@ -34,7 +35,7 @@ def switching(scene: Scene) -> Step:
     state = SwitchingState()
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
     ) -> Command:
         nonlocal state
         result = plan(params, state, (x, y), (vx, vy), scene.goal, seen)
@@ -44,10 +45,14 @@ def switching(scene: Scene) -> Step:
     return step
 
 
-def _retreats(scene: Scene, x: float, y: float, seen: Seen) -> bool:
-    moving = [o for o in seen if o[4] or o[5]]
+def _retreats(scene: Scene, x: float, y: float, seen: list[Seen]) -> bool:
+    moving = [
+        Disc(o.track, x - o.x, y - o.y, o.radius, o.v_x, o.v_y)
+        for o in seen
+        if o.v_x or o.v_y
+    ]
     clearance = scene.robot.radius + 2.0 * MARGIN
-    return time_to_enter(x, y, 0.0, 0.0, moving, clearance) < 2.0
+    return time_to_enter(0.0, 0.0, moving, clearance) < 2.0
 
 
 def classical(scene: Scene) -> Step:
@@ -55,7 +60,7 @@ def classical(scene: Scene) -> Step:
     params = ClassicalParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
     ) -> Command:
         velocity = summed_fields(params, (x, y), scene.goal, seen)
         return *velocity, _retreats(scene, x, y, seen)
@@ -69,7 +74,7 @@ def statechart(scene: Scene) -> Step:
     memory = Manoeuvre()
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
     ) -> Command:
         nonlocal memory
         ux, uy, memory = statechart_step(params, memory, (x, y), scene.goal, seen)
@@ -85,7 +90,7 @@ def orca(scene: Scene) -> Step:
     robot = scene.robot
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
     ) -> Command:
         world = pyrvo.RVOSimulator()
         world.set_time_step(scene.dt)
@@ -123,7 +128,7 @@ def hrvo(scene: Scene) -> Step:
     behavior.target = core.Target.Point(scene.goal, 0.5 * robot.reach)
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: Seen
+        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
     ) -> Command:
         behavior.pose = core.Pose2((x, y), 0.0)
         behavior.twist = core.Twist2((vx, vy), 0.0)

@@ -1,5 +1,6 @@
 """Resection: feasibility, map, plan and reach in a tumour of some 65 cm3."""
 
+from collections.abc import Callable
 import resource
 from time import process_time
 
@@ -8,6 +9,7 @@ import numpy as np
 from plants.snake.parameters import SnakeParams
 from plants.tissue.tissue import SyntheticTumour, synthetic_tumour
 from plants.tissue.volume import Access, make_volume
+from systems.common.compiled import rehearse
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import Procedure
@@ -19,9 +21,9 @@ LENGTH = 0.058
 """Of the tumour's bounding box in m: some 65 cm3."""
 
 
-def new_session(seed: int) -> Session:
+def new_session(seed: int, length: float = LENGTH) -> Session:
     """A session at its beginning, voxels of 0.5 mm."""
-    tissue = synthetic_tumour(SyntheticTumour(length=LENGTH, seed=seed))
+    tissue = synthetic_tumour(SyntheticTumour(length=length, seed=seed))
     access = Access(direction=[0.0, 0.0, -1.0])
     return Session(make_volume(tissue, access, 4e-3), SnakeParams())
 
@@ -40,11 +42,13 @@ def random_procedure(session: Session, rng: np.random.Generator) -> Procedure:
 
 def report(seed: int, scenes: int) -> str:
     """Processor time of each part; `scenes` procedures are checked."""
-    warm = new_session(seed)
-    Planner(warm, warm.volume.allowed > 0).enter()
-    warm.check(random_procedure(warm, np.random.default_rng(seed)))
-    feasibility_map(warm, 10)
-    session = new_session(seed)
+    rehearse(lambda: measure(lambda: new_session(seed, 0.02), seed, 1))
+    return measure(lambda: new_session(seed), seed, scenes)
+
+
+def measure(make: Callable[[], Session], seed: int, scenes: int) -> str:
+    """What `report` says, of the sessions that `make` makes."""
+    session = make()
     lines = [f"  tumour {1e6 * session.volume.tumour_volume:.1f} cm3, 0.5 mm voxels"]
     start = process_time()
     reach = find_reach(session, seed)
@@ -71,7 +75,7 @@ def report(seed: int, scenes: int) -> str:
         f"  map of {len(found.points)} in {process_time() - start:.2f} s, "
         f"{found.feasible.mean():.0%} feasible"
     )
-    session = new_session(seed)
+    session = make()
     start = process_time()
     Planner(session, reach.mask).run()
     lines.append(
@@ -81,7 +85,3 @@ def report(seed: int, scenes: int) -> str:
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lines.append(f"  memory {memory:.2f} GB")
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(report(1, 100))

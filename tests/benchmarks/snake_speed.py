@@ -24,8 +24,8 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
 from diagrams.snake.scenario import ELASTIC_STEP
+from diagrams.studies import load_scenario
 from plants.snake.actuation import angles_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.inverse_kinematics import positioning, tool_postures
@@ -125,9 +125,9 @@ def circle() -> Circle:
     """`snake_circle`, every 2 ms."""
     tip = load_scenario("snake_circle").tip
     time = np.arange(0.0, DURATION + 0.1, 2e-3)
-    poses = np.array([reference(tip, t) for t in time])
-    x = tool_postures(poses[:, :3], poses[:, 3:6], poses[:, 6:], PARAMS).x
-    return Circle(time, x, poses[:, :3])
+    p_WT, n_WT, n_WI = np.array([reference(tip, t) for t in time]).swapaxes(0, 1)
+    x = tool_postures(p_WT, n_WT, n_WI, PARAMS).x
+    return Circle(time, x, p_WT)
 
 
 @dataclass
@@ -328,7 +328,3 @@ def report(seed: int = 1, scenes: int = 0) -> str:
     if importlib.util.find_spec("mujoco") is None:
         lines += ["", "MuJoCo is not installed: pip install 'trocar[peers]'"]
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(report())

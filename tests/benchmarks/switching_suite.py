@@ -1,17 +1,15 @@
 """Switching potentials and their peers, in the same worlds.
 
-`python -m tests.benchmarks.switching_suite [--suite NAME] [--seed N] [--scenes N]`.
 Each suite is run on its fixed seed and on a held-out one. Peers come with
 `pip install -e '.[peers]'`; without them our own planners run alone.
 """
 
-import argparse
 from collections.abc import Iterator, Sequence
 import statistics
 
-from tests.benchmarks.harness import Planner, Result, run
+from tests.benchmarks.navigation_loop import Planner, Result, run
+from tests.benchmarks.navigation_scenes import SUITES, Scene
 from tests.benchmarks.navigators import planners
-from tests.benchmarks.scenes import SUITES, Scene
 
 FIXED = 0
 """Seed of the fixed worlds."""
@@ -98,18 +96,3 @@ def tables(seed: int, scenes: int, suites: Sequence[str] = ()) -> Iterator[str]:
         if name != "classics":
             held_out = make(100 + seed, **count)
             yield table(f"{name}, held-out seed {seed}", held_out, chosen)
-
-
-def main() -> None:
-    """Runs the command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--suite", action="append", choices=list(SUITES))
-    parser.add_argument("--seed", type=int, default=1, help="of the held-out worlds")
-    parser.add_argument("--scenes", type=int, default=FULL, help="of each suite")
-    arguments = parser.parse_args()
-    for text in tables(arguments.seed, arguments.scenes, arguments.suite or ()):
-        print(text, flush=True)
-
-
-if __name__ == "__main__":
-    main()

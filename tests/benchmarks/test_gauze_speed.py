@@ -2,7 +2,7 @@
 
 import pytest
 
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from tests.benchmarks.gauze_speed import measure, summary, table
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from tests.benchmarks.snake_speed import circle, drake, kinematics
 
 

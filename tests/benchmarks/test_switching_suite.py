@@ -4,8 +4,8 @@ from math import hypot
 
 import pytest
 
+from tests.benchmarks.navigation_scenes import SUITES, solvable
 from tests.benchmarks.navigators import switching
-from tests.benchmarks.scenes import SUITES, solvable
 from tests.benchmarks.switching_suite import evaluate, report
 
 

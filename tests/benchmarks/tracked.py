@@ -4,15 +4,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from systems.common.geometry import sub, unit, xyz
-from systems.sensing import trajectory_estimator
-from systems.sensing.optical_tracker import OpticalTrackerParams, disturb
+from systems.common.geometry import sub, unit
+from systems.common.signal import vector
+from systems.common.signals import Estimate, Shaft, TrackedShaft
+from systems.sensing import optical_tracker, trajectory_estimator
+from systems.sensing.optical_tracker import MarkerBody, MarkerNoise
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 
 def tracked(
     seed: int, number: int, wall_height: float
-) -> Callable[[float, np.ndarray], np.ndarray]:
+) -> Callable[[float, Estimate], Estimate]:
     """A tracker and an estimator with their defaults, for one scene.
 
     A frame is delivered a period after its exposure (latency 14.2 ms), with the noise
@@ -24,27 +26,22 @@ def tracked(
         wall_height: Of the abdominal wall where O enters, m; known to within 10 mm.
 
     Returns:
-        A function of the time and the exact estimate (17) that gives the estimate (17).
+        A function of the time and the exact estimate that gives the estimate.
     """
     rng = np.random.default_rng([seed, 13, number])
-    body = OpticalTrackerParams().body
+    markers = optical_tracker.constants(MarkerBody())[0]
     params = TrajectoryEstimatorParams(wall_height=wall_height)
     record = trajectory_estimator.constants(params)[0]
     state = trajectory_estimator.initial(params)
-    frames: list[np.ndarray] = []
+    frames: list[TrackedShaft] = []
 
-    def sense(time: float, exact: np.ndarray) -> np.ndarray:
+    def sense(time: float, exact: Estimate) -> Estimate:
         nonlocal state
-        p = xyz(exact, 0)
-        shaft = p + unit(sub(p, xyz(exact, 9)))
-        seen = disturb(
-            shaft,
-            rng.standard_normal(6),
-            body.lever,
-            body.sigma_position(),
-            body.sigma_direction(),
-        )
-        frames.append(np.array(seen + (time, 1.0)))
+        shaft = Shaft(exact.p, unit(sub(exact.p, exact.fulcrum)))
+        place, turn = rng.standard_normal((2, 3))
+        noise = MarkerNoise(vector(place), vector(turn))
+        seen = optical_tracker.disturb(markers, shaft, noise)
+        frames.append(TrackedShaft(seen.tip, seen.u, time, 1.0))
         if len(frames) > 1:
             state = trajectory_estimator.absorb(record, state, frames.pop(0))
         return trajectory_estimator.predict(record, state, time)

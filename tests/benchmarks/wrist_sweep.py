@@ -1,21 +1,18 @@
 """The passive wrist over stiffness, breathing, rate, first error: the real arm.
 
-`python -m tests.benchmarks.wrist_sweep --seed 1 --out out/wrist_sweep` runs every
-case in closed loop with the arm, unknown stiffness, sensor noise and drift, a swing
-of 14 degrees from the start, and prints a table. The waves alternate between sine
-and ventilator. `wrist_sweep.png` is its heat map, `wrist_sweep.csv` the figures.
-The random cases of `monte_carlo` ask whether the estimator is as sure as it should
-be: the share of normalised squared errors above the 95 % point, after 15 s.
+Every case runs in closed loop with the arm, unknown stiffness, sensor noise and drift,
+a swing of 14 degrees from the start. The waves alternate between sine and ventilator.
+`wrist_sweep.png` is its heat map, `wrist_sweep.csv` the figures. The random cases of
+`monte_carlo` ask whether the estimator is as sure as it should be: the share of
+normalised squared errors above the 95 % point, after 15 s.
 """
 
-import argparse
 from concurrent.futures import ProcessPoolExecutor
 import csv
 from dataclasses import dataclass
 import itertools
 import math
 from pathlib import Path
-import sys
 
 import numpy as np
 
@@ -152,14 +149,6 @@ def run_case(case: Case) -> dict[str, object]:
     return {**vars(case), **figures, "error": run.error}
 
 
-def run_all(cases: list[Case], jobs: int) -> list[dict[str, object]]:
-    """Runs cases, a few at a time, in their order."""
-    if jobs == 1:
-        return [run_case(case) for case in cases]
-    with ProcessPoolExecutor(jobs) as pool:
-        return list(pool.map(run_case, cases))
-
-
 def column(rows: list[dict[str, object]], key: str) -> np.ndarray:
     """One figure of all cases."""
     return np.array([row[key] for row in rows], float)
@@ -231,44 +220,21 @@ def save(rows: list[dict[str, object]], path: Path) -> None:
         writer.writerows(rows)
 
 
-def study(seed: int, out: Path, jobs: int = 1, every: int = 1, random: int = 24) -> str:
-    """Runs sweep, margins and random walls; writes CSV files and plots into `out`."""
+def report(seed: int, scenes: int) -> str:
+    """Runs sweep, margins and random walls; writes CSV files and plots."""
+    out = Path("out/wrist_sweep")
     out.mkdir(parents=True, exist_ok=True)
     texts = []
     for name, cases, draw in (
-        ("sweep", sweep(seed)[::every], heat_map),
-        ("margins", margins(seed)[::every], margin_plot),
-        ("random walls", monte_carlo(seed, random), None),
+        ("sweep", sweep(seed), heat_map),
+        ("margins", margins(seed), margin_plot),
+        ("random walls", monte_carlo(seed, 24), None),
     ):
-        if not cases:
-            continue
-        rows = run_all(cases, jobs)
+        with ProcessPoolExecutor() as pool:
+            rows = list(pool.map(run_case, cases))
         stem = f"wrist_{name.replace(' ', '_')}"
         save(rows, out / f"{stem}.csv")
         if draw is not None:
             draw(rows, out / f"{stem}.png")
         texts.append(summary(rows, name))
-    return "\n".join(texts)
-
-
-def report(seed: int, scenes: int) -> str:
-    """The study as `make bench` prints it."""
-    out = Path("out/wrist_sweep")
-    return f"{study(seed, out)}\n  cases and plots: {out}/"
-
-
-def main(argv: list[str] | None = None) -> int:
-    """Runs the study."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--every", type=int, default=1, help="run every n-th case")
-    parser.add_argument("--monte-carlo", type=int, default=24, help="random cases")
-    parser.add_argument("--out", type=Path, default=Path("out/wrist_sweep"))
-    a = parser.parse_args(argv)
-    print(study(a.seed, a.out, a.jobs, a.every, a.monte_carlo))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return "\n".join([*texts, f"  cases and plots: {out}/"])

@@ -1,5 +1,6 @@
 """One contract for every block there is."""
 
+from functools import cache
 import importlib
 import inspect
 import pkgutil
@@ -10,8 +11,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem, PortDataType
 import pytest
 
-from diagrams.common.scenario import load_scenario
-from diagrams.common.study import get_study
+from diagrams.studies import STUDIES, build, load_scenario
 import plants
 import systems
 from systems.common.block import Block
@@ -34,8 +34,16 @@ def all_blocks(package) -> list[type]:
 
 
 BLOCKS = all_blocks(systems)
-DIAGRAMS = ["gauze_static", "pwe_arc", "nav_one_static"]
-"""One scenario of every kind of diagram."""
+DIAGRAMS: dict[str, list[str]] = {
+    "gauze_static": [],
+    "gauze_hunted": [],
+    "pwe_arc": [],
+    "nav_one_static": [],
+    "nav_crowd": [],
+    "snake_wire_break": [],
+    "resect_paper": ["spacing=0.001", "reach_effort=0.05"],
+}
+"""Scenarios with overrides: every kind of diagram, and every observer in one."""
 # What observes a plant has no ports' values without it: tested in its diagram.
 OBSERVERS = all_blocks(plants)
 
@@ -94,10 +102,19 @@ def test_ports_are_named_and_documented(kind):
     assert_documented(kind())
 
 
+@cache
+def diagram_of(name: str):
+    """A scenario's diagram, made once."""
+    return build(load_scenario(name, DIAGRAMS[name]))
+
+
+def test_every_kind_of_diagram_is_there():
+    assert {load_scenario(name).system for name in DIAGRAMS} == set(STUDIES)
+
+
 @pytest.mark.parametrize("name", DIAGRAMS)
 def test_observers_in_their_diagram(name):
-    scenario = load_scenario(name)
-    diagram = get_study(scenario.system).make_diagram(scenario)
+    diagram = diagram_of(name)
     context = diagram.CreateDefaultContext()
     for system in diagram.GetSystems():
         if type(system) in OBSERVERS:
@@ -109,9 +126,7 @@ def test_observers_in_their_diagram(name):
 def test_every_observer_is_in_a_diagram():
     seen = set()
     for name in DIAGRAMS:
-        scenario = load_scenario(name)
-        diagram = get_study(scenario.system).make_diagram(scenario)
-        seen |= {type(system) for system in diagram.GetSystems()}
+        seen |= {type(system) for system in diagram_of(name).GetSystems()}
     assert set(OBSERVERS) <= seen
 
 
@@ -151,3 +166,87 @@ def test_inputs_are_left_alone(kind):
     outputs(dut, context)
     for port, value in zip(vectors, before, strict=True):
         np.testing.assert_array_equal(port.Eval(context), value)
+
+
+ALL, NONE = slice(None), slice(0)
+RATE, HELD, TOOL = (ALL, NONE), (NONE, ALL), (slice(6, 12), slice(0, 6))
+COMMANDS = {
+    "ArcNavigation": {"tool": TOOL},
+    "BackwardMovement": {"v3": RATE},
+    "ClassicalPlanner": {"v_R": RATE},
+    "ClearanceConstraint": {"v_safe": RATE},
+    "Endoscope": {"shaft": HELD, "view_cone": HELD},
+    "FuzzyArbiter": {"v_R": RATE},
+    "GoToTarget": {"v1": RATE},
+    "JointCommands": {"posture": HELD, "set_point": HELD},
+    "PassiveWristEmulation": {"tool": TOOL},
+    "ResectionIk": {"posture": HELD},
+    "StatechartPlanner": {"v_R": RATE},
+    "SwitchingPlanner": {"v_R": RATE},
+    "ToolBypass": {"v1": RATE},
+    "ToolNavigation": {"tool": TOOL},
+    "UnicycleControl": {"command": RATE},
+    "VelocityCorrections": {"v2": RATE},
+    "WireDrums": {"rates": RATE, "lengths": HELD},
+    "WireForwardActuation": {"desired_state": (slice(7, 14), slice(0, 7))},
+    "WireInverseActuation": {"drums": HELD},
+}
+"""Outputs that command a motion, by block: which of their elements are rates, that must
+come to zero, and which are poses or set-points, that must come to a halt."""
+OBSERVE = {
+    *("FulcrumEstimator", "OpticalTracker", "Perception", "RobotLocation"),
+    *("SnakeLocation", "ToolWrench", "TrajectoryEstimator", "WireTension", "WireWatch"),
+}
+"""Blocks that command nothing."""
+LEAD = {"ProcedurePlayer", "TipReference"}
+"""Blocks that command without an input."""
+BROKEN = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf}
+GO_ON = {
+    *("ClearanceConstraint.guide", "ClearanceConstraint.robot_tool"),
+    *("ClearanceConstraint.obstacles", "ClearanceConstraint.target"),
+    *("ClearanceConstraint.camera", "ClearanceConstraint.view_cone"),
+    *("ClearanceConstraint.permission", "ToolBypass.camera"),
+}
+"""Inputs without which a block goes on, no faster than before: the constraint lets pass
+what it cannot judge, and a camera out of sight is no obstacle."""
+CASES = [
+    (kind, port.get_name())
+    for kind in BLOCKS
+    if kind.__name__ in COMMANDS
+    for port in map(kind().get_input_port, range(kind().num_input_ports()))
+]
+
+
+def test_it_is_known_what_every_block_commands():
+    assert {kind.__name__ for kind in BLOCKS} == {*COMMANDS, *OBSERVE, *LEAD}
+
+
+def commands(dut: LeafSystem, context) -> dict[str, np.ndarray]:
+    """A block's outputs that command a motion."""
+    names = COMMANDS[type(dut).__name__]
+    return {name: np.array(dut.GetOutputPort(name).Eval(context)) for name in names}
+
+
+@pytest.mark.parametrize("value", BROKEN)
+@pytest.mark.parametrize(
+    ("kind", "name"), CASES, ids=[f"{kind.__name__}.{name}" for kind, name in CASES]
+)
+def test_a_broken_input_ends_in_rest(kind, name, value):
+    case = f"{kind.__name__}.{name}"
+    dut = kind()
+    context = fixed_context(dut)
+    simulator = Simulator(dut, context)
+    simulator.AdvanceTo(0.3)
+    port = dut.GetInputPort(name)
+    port.FixValue(context, np.full(port.size(), BROKEN[value]))
+    first = last = commands(dut, context)
+    for time in np.arange(0.4, 3.0, 0.1):
+        simulator.AdvanceTo(time)
+        before, last = last, commands(dut, context)
+        assert all(np.isfinite(value).all() for value in last.values())
+    for output, (rates, places) in COMMANDS[kind.__name__].items():
+        limit = np.abs(first[output][rates]) if case in GO_ON else 1e-6
+        assert (np.abs(last[output][rates]) <= limit).all()
+        np.testing.assert_allclose(
+            last[output][places], before[output][places], atol=1e-7
+        )

@@ -8,7 +8,7 @@ first those that gain much, then those that gain little.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from plants.snake.last_module import meridian
 from plants.tissue.labels import TUMOUR
 from plants.tissue.space import SOLID
+from systems.common.parameter import Rules, check, parameter
 from systems.resection.planning.draws import new_draws
 from systems.resection.planning.growth import grow
 from systems.resection.planning.procedure import ELEMENTARY, ENTRY, Procedure
@@ -39,69 +40,78 @@ WEARY = 100
 
 @dataclass
 class PlannerParams:
-    """How the planner goes about it.
+    """How the planner goes about it."""
 
-    Attributes:
-        target: Share of the reachable part at which it stops.
-        pitch: Of poses when carried out, in m.
-        trial_pitch: Of poses when a candidate is tried, in m.
-        passes: Largest bends of the entry's passes, in rad.
-        candidates: Procedures tried for one that is chosen.
-        lengths: Of candidates, in m.
-        least_gain: Of a procedure, as a share of the reachable part; below it the
-            finisher takes over.
-        lump: How far, in m, the finisher looks from where it starts a lump.
-        step_gains: Tumour that a step of the finisher must free, in m3, stage by
-            stage.
-        rounds: Through all lumps in a stage but the last, which goes on.
-        attempts: Of steps in a lump before the finisher looks at what they gained;
-            four times as many in the last stage.
-        budget: Single steps that the finisher tries at most.
-        seed: Of all random choices.
-    """
-
-    target: float = 0.986
-    pitch: float = 2.0e-3
-    trial_pitch: float = 3.0e-3
-    passes: list[float] = field(
-        default_factory=lambda: [math.radians(8.0), math.radians(20.0), math.pi / 4]
+    target: float = parameter(
+        0.986, "share of the reachable part at which it stops", above=0.0, most=1.0
     )
-    candidates: int = 32
-    lengths: list[float] = field(default_factory=lambda: [0.0, 0.006, 0.012])
-    least_gain: float = 0.01
-    lump: float = 0.006
-    step_gains: list[float] = field(
-        default_factory=lambda: [27e-9, 9e-9, 3e-9, 0.6e-9, 0.25e-9]
+    pitch: float = parameter(
+        2.0e-3, "of poses when carried out", "m", least=5e-4, most=6e-3
     )
-    rounds: int = 4
-    attempts: int = 400
-    budget: int = 20_000_000
-    seed: int = 1
+    trial_pitch: float = parameter(
+        3.0e-3, "of poses when a candidate is tried", "m", least=5e-4, most=6e-3
+    )
+    passes: list[float] = parameter(
+        [math.radians(8.0), math.radians(20.0), math.pi / 4],
+        "largest bends of the entry's passes",
+        "rad",
+        above=0.0,
+        most=math.pi / 4,
+        shape=(-1,),
+    )
+    candidates: int = parameter(
+        32, "procedures tried for one that is chosen", least=1, most=10_000
+    )
+    lengths: list[float] = parameter(
+        [0.0, 0.006, 0.012], "of candidates", "m", least=0.0, most=0.1, shape=(-1,)
+    )
+    # Below it the finisher takes over.
+    least_gain: float = parameter(
+        0.01,
+        "of a procedure, as a share of the reachable part",
+        least=0.0,
+        most=1.0,
+    )
+    lump: float = parameter(
+        0.006,
+        "how far the finisher looks from where it starts a lump",
+        "m",
+        least=5e-4,
+        most=0.1,
+    )
+    step_gains: list[float] = parameter(
+        [27e-9, 9e-9, 3e-9, 0.6e-9, 0.25e-9],
+        "tumour that a step of the finisher must free, stage by stage",
+        "m3",
+        least=0.0,
+        most=1e-6,
+        shape=(-1,),
+    )
+    rounds: int = parameter(
+        4,
+        "through all lumps in a stage but the last, which goes on",
+        least=1,
+        most=1000,
+    )
+    # Four times as many in the last stage.
+    attempts: int = parameter(
+        400,
+        "steps in a lump before the finisher looks at what they gained",
+        least=1,
+        most=1_000_000,
+    )
+    budget: int = parameter(
+        20_000_000,
+        "single steps that the finisher tries at most",
+        least=1,
+        most=10_000_000_000,
+    )
+    seed: int = parameter(1, "of all random choices", least=0, most=2**63 - 1)
 
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        if not 0.0 < self.target <= 1.0:
-            raise ValueError(f"planner.target={self.target}: expected 0 to 1")
-        for name in ("pitch", "trial_pitch"):
-            if not 5e-4 <= getattr(self, name) <= 6e-3:
-                raise ValueError(
-                    f"planner.{name}={getattr(self, name)} m: expected 0.0005 to 0.006"
-                )
-        if self.candidates < 1 or not self.lengths or min(self.lengths) < 0.0:
-            raise ValueError(
-                "planner.candidates and planner.lengths: expected at least one each"
-            )
-        if not self.step_gains or min(self.step_gains) < 0.0:
-            raise ValueError(
-                f"planner.step_gains={self.step_gains} m3: expected at least one, >= 0"
-            )
-        for name in ("rounds", "attempts", "budget"):
-            if getattr(self, name) < 1:
-                raise ValueError(
-                    f"planner.{name}={getattr(self, name)}: expected at least 1"
-                )
-        if not all(0.0 < bend <= math.pi / 4 + 1e-9 for bend in self.passes):
-            raise ValueError(f"planner.passes={self.passes} rad: expected 0 to pi/4")
+    def rules(self) -> Rules:
+        """There must be something to try."""
+        for name in ("lengths", "step_gains"):
+            yield bool(getattr(self, name)), name, "at least one"
 
 
 class Planner:
@@ -123,8 +133,7 @@ class Planner:
             progress: Called with the share of the goal that is planned.
         """
         self.session = session
-        self.params = params or PlannerParams()
-        self.params.check()
+        self.params = check(params or PlannerParams())
         self.goal = np.flatnonzero(reachable.reshape(-1)).astype(np.int32)
         self.progress = progress
         self.rng = np.random.default_rng(self.params.seed)

@@ -15,6 +15,7 @@ import numpy as np
 
 from plants.snake.last_module import bend_for_radius
 from plants.snake.parameters import SnakeParams
+from systems.common.parameter import ParameterError, Rules, check, parameter
 
 ENTRY, ELEMENTARY, VOLUME = "entry", "elementary", "volume"
 KINDS = (ENTRY, ELEMENTARY, VOLUME)
@@ -22,69 +23,74 @@ KINDS = (ENTRY, ELEMENTARY, VOLUME)
 
 @dataclass
 class Tool:
-    """A tool: the ball that its rotating wire ring sweeps.
+    """A tool: the ball that its rotating wire ring sweeps."""
 
-    Attributes:
-        radius: Of the ball in m.
-        offset: From O3 to its centre in m.
-    """
-
-    radius: float = 4.0e-3
-    offset: float = 3.0e-3
+    radius: float = parameter(4.0e-3, "of the ball", "m", above=0.0, most=0.02)
+    offset: float = parameter(
+        3.0e-3, "from O3 to its centre", "m", least=0.0, most=0.05
+    )
 
 
 @dataclass
 class Procedure:
-    """A procedure in the channel frame W.
+    """A procedure in the channel frame W."""
 
-    Attributes:
-        kind: "entry", "elementary" or "volume".
-        position: Where the tool is when it starts, last module straight, in m. An
-            entry starts in the channel.
-        direction: Its axis; an entry's is that of the channel.
-        length: How far it goes along the axis, in m; 0 for an elementary volume.
-        radius: Of what it removes about its axis, tool included, in m.
-        clipped: Whether poses that fail are left out; the paper's is refused whole.
-        pitch: Between poses of a ring, rings, and elementary volumes, in m.
-        tool: The tool; the robot's own if None.
-        name: For lists and plots.
-    """
+    kind: str = parameter(ENTRY, "who places it, and how long it is", choices=KINDS)
+    # An entry starts in the channel.
+    position: list[float] | None = parameter(
+        None,
+        "where the tool is when it starts, last module straight",
+        "m",
+        least=-0.5,
+        most=0.5,
+        shape=(3,),
+    )
+    direction: list[float] | None = parameter(
+        None,
+        "its axis; an entry's is that of the channel",
+        least=-1e3,
+        most=1e3,
+        shape=(3,),
+    )
+    length: float = parameter(
+        0.010,
+        "how far it goes along the axis; 0 for an elementary volume",
+        "m",
+        least=0.0,
+        most=0.5,
+    )
+    radius: float = parameter(
+        0.008,
+        "of what it removes about its axis, tool included",
+        "m",
+        above=0.0,
+        most=0.1,
+    )
+    clipped: bool = parameter(
+        False, "whether poses that fail are left out; the paper's is refused whole"
+    )
+    pitch: float = parameter(
+        2.0e-3,
+        "between poses of a ring, rings, and elementary volumes",
+        "m",
+        least=2e-4,
+        most=0.01,
+    )
+    tool: Tool | None = parameter(None, "the tool; the robot's own if left out")
+    name: str = parameter("", "for lists and plots")
 
-    kind: str = ENTRY
-    position: list[float] | None = None
-    direction: list[float] | None = None
-    length: float = 0.010
-    radius: float = 0.008
-    clipped: bool = False
-    pitch: float = 2.0e-3
-    tool: Tool | None = None
-    name: str = ""
-
-    def check(self, params: SnakeParams) -> None:
-        """Raises ValueError for a value that makes no sense for a robot."""
-        name = self.name or self.kind
-        if self.kind not in KINDS:
-            raise ValueError(f"{name}: kind={self.kind!r}, choose from {KINDS}")
-        for key in ("position", "direction"):
-            v = getattr(self, key)
-            if self.kind == ENTRY:
-                if v is not None:
-                    raise ValueError(f"{name}: an entry's {key} is the channel's")
-            elif v is None or len(v) != 3 or not all(map(math.isfinite, v)):
-                raise ValueError(f"{name}: {key}={v}, expected three finite numbers")
-        if self.direction is not None and math.hypot(*self.direction) < 1e-9:
-            raise ValueError(f"{name}: direction={self.direction} is no direction")
-        if not (math.isfinite(self.length) and self.length >= 0.0):
-            raise ValueError(f"{name}: length={self.length} m, expected >= 0")
-        if self.kind == VOLUME and self.length != 0.0:
-            raise ValueError(f"{name}: an elementary volume's length is 0")
-        if not 2e-4 <= self.pitch <= 0.01:
-            raise ValueError(f"{name}: pitch={self.pitch} m, expected 0.0002 to 0.01")
-        ball = with_tool(params, self.tool).tool_radius
-        if not self.radius >= ball:
-            raise ValueError(
-                f"{name}: radius={self.radius} m is less than the tool's own {ball} m"
-            )
+    def rules(self) -> Rules:
+        """What an entry has and others have not, and the other way round."""
+        is_entry = self.kind == ENTRY
+        for name in ("position", "direction"):
+            expected = "three numbers"
+            if is_entry:
+                expected = f"none: an entry's {name} is the channel's"
+            yield (getattr(self, name) is None) == is_entry, name, expected
+        n = self.direction
+        yield n is None or math.hypot(*n) >= 1e-9, "direction", "a direction"
+        is_long = self.kind == VOLUME and self.length != 0.0
+        yield not is_long, "length", "0 for an elementary volume"
 
     def axis(self) -> np.ndarray:
         """Unit vector along it, (3,)."""
@@ -97,7 +103,24 @@ def with_tool(params: SnakeParams, tool: Tool | None) -> SnakeParams:
     if tool is None:
         return params
     changed = {**asdict(params), "tool_radius": tool.radius, "tool_offset": tool.offset}
-    return SnakeParams(**changed).check()
+    return check(SnakeParams(**changed), "tool")
+
+
+def check_procedure(procedure: Procedure, params: SnakeParams, owner: str = "") -> None:
+    """Raises ParameterError for a procedure that makes no sense for a robot.
+
+    Args:
+        procedure: The procedure.
+        params: The robot.
+        owner: The procedure's key; its name or kind if empty.
+    """
+    owner = owner or procedure.name or procedure.kind
+    check(procedure, owner)
+    ball = with_tool(params, procedure.tool).tool_radius
+    if not procedure.radius >= ball:
+        raise ParameterError(
+            f"{owner}.radius={procedure.radius} m: expected >= {ball}, the tool's own"
+        )
 
 
 def widest_bend(procedure: Procedure, params: SnakeParams) -> float:

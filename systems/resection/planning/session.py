@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of
+from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
 from plants.tissue.volume import Volume
 from systems.common.archive import read_archive, write_archive
+from systems.common.parameter import check
 from systems.resection.planning.feasibility import (
     NEVER,
     Answer,
@@ -24,6 +26,7 @@ from systems.resection.planning.feasibility import (
 from systems.resection.planning.procedure import (
     ENTRY,
     Procedure,
+    check_procedure,
     procedure_of,
     widest_bend,
     with_tool,
@@ -40,6 +43,9 @@ from systems.resection.planning.tree import (
 
 ROOM = 60_000
 """Nodes, and visits, that one step of a session may need."""
+
+FORMAT = 2
+"""Of a session's file; from 2 on it holds what is critical as the mask has it."""
 
 STARTS = 24
 """Nodes from which a procedure's start is tried."""
@@ -92,7 +98,7 @@ class Session:
     concluded: str = ""
 
     def __post_init__(self) -> None:
-        self.params.check()
+        check(self.params)
         self.body: Body = body_of(self.params, self.clearance, self.accuracy)
         self.home = home_posture(self.volume, self.params)
         c = np.empty((POINTS, 3))
@@ -169,7 +175,7 @@ class Session:
         self.volume.forget_journals()
         self.make_room()
         self._mark = (0, 0, int(self.tree.size[0]), int(self.tree.size[1]))
-        procedure.check(self.params)
+        check_procedure(procedure, self.params)
         params = with_tool(self.params, procedure.tool)
         body = self.body
         if procedure.tool is not None:
@@ -305,12 +311,16 @@ class Session:
             "tip": t.tip[:nodes],
             "route": t.route[:visits],
         }
+        if v.critical is not None:
+            arrays |= {"critical": v.critical.index, "X_WV": v.critical.X_WV}
         meta = {
-            "format": 1,
+            "format": FORMAT,
             "spacing": v.spacing,
             "channel": v.channel,
             "channel_depth": v.depth,
             "margin": v.margin,
+            "mask_volume": v.mask_volume,
+            "notes": v.notes,
             "clearance": self.clearance,
             "accuracy": self.accuracy,
             "params": asdict(self.params),
@@ -327,6 +337,11 @@ def load_session(path: Path) -> Session:
         ValueError: If the file is not there or damaged; the one before is offered.
     """
     meta, arrays = read_archive(path, "session")
+    if meta["format"] != FORMAT:
+        raise ValueError(
+            f"session {str(path)!r} has format {meta['format']}, expected {FORMAT}: "
+            "it was planned by another version; plan it anew"
+        )
     volume = Volume(
         arrays["labels"],
         arrays["origin"],
@@ -336,6 +351,9 @@ def load_session(path: Path) -> Session:
         arrays["X_PW"],
         meta["margin"],
         arrays["tau"],
+        Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
+        mask_volume=meta["mask_volume"],
+        notes=meta["notes"],
     )
     session = Session(
         volume, SnakeParams(**meta["params"]), meta["clearance"], meta["accuracy"]

@@ -1,42 +1,46 @@
 """Procedure player: plays a plan as a smooth stream of tool poses."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
+from plants.snake.signals import ToolPose, ToolTarget
 from systems.common.block import Block
+from systems.common.parameter import check, parameter
+from systems.common.signal import Field, flat, vector
+
+
+class Progress(NamedTuple):
+    """How far a plan has been played."""
+
+    posture: Annotated[float, Field("1", "the one last reached", 0.0)]
 
 
 @dataclass
 class ProcedurePlayerParams:
-    """Parameters of `ProcedurePlayer`.
+    """Parameters of `ProcedurePlayer`."""
 
-    Attributes:
-        lead: How far ahead of time ``target`` is, the control period, in s.
-        bend_rate: Largest rate of a or b of a ball, in rad/s.
-        travel_rate: Largest speed of the translation, in m/s.
-        dwell: At the beginning and at the end, in s.
-    """
-
-    lead: float = 0.02
-    bend_rate: float = 1.2
-    travel_rate: float = 0.010
-    dwell: float = 0.3
-
-    def check(self) -> None:
-        """Raises ValueError for a value that makes no sense."""
-        for name, value in vars(self).items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(
-                    f"procedure_player.{name}={value}: expected > 0; the default is "
-                    f"{getattr(ProcedurePlayerParams(), name)}"
-                )
+    lead: float = parameter(
+        0.02,
+        "how far ahead of time `target` is, the control period",
+        "s",
+        least=1e-3,
+        most=0.1,
+    )
+    bend_rate: float = parameter(
+        1.2, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+    )
+    travel_rate: float = parameter(
+        0.010, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+    )
+    dwell: float = parameter(
+        0.3, "at the beginning and at the end", "s", above=0.0, most=60.0
+    )
 
 
 def schedule(x: NDArray[np.float64], params: ProcedurePlayerParams) -> NDArray:
@@ -65,12 +69,9 @@ class ProcedurePlayer(Block):
     checked. The intermediate axis goes along, so the inverse kinematics finds the
     planned posture again.
 
-    Port ``target`` emits p_WT [m], tool axis n_WT and intermediate axis n_WI,
-    channel frame W, ``lead`` ahead of time (9).
-
-    Port ``reference`` emits p_WT [m] and n_WT for this instant (6).
-
-    Port ``progress`` emits the index of the posture last reached (1).
+    Port ``target`` emits the `ToolTarget`, ``lead`` ahead of time.
+    Port ``reference`` emits the `ToolPose` of this instant.
+    Port ``progress`` emits the `Progress`.
     """
 
     def __init__(
@@ -90,9 +91,8 @@ class ProcedurePlayer(Block):
                 have been played.
         """
         super().__init__()
-        self._params = params or ProcedurePlayerParams()
-        self._params.check()
-        self._snake = (snake or SnakeParams()).check()
+        self._params = check(params or ProcedurePlayerParams())
+        self._snake = check(snake or SnakeParams())
         if postures is None:
             postures = [[0.0] * 7, [0.002, 0.0, 0.1, 0.0, 0.1, 0.2, 0.1]]
         self._x = np.array(postures, float)
@@ -105,9 +105,9 @@ class ProcedurePlayer(Block):
         self._first, self._x = first, self._x[first:]
         self._times = schedule(self._x, self._params)
         ticket = {self.time_ticket()}
-        self.vector_out("target", 9, self._calc_target, ticket)
-        self.vector_out("reference", 6, self._calc_reference, ticket)
-        self.vector_out("progress", 1, self._calc_progress, ticket)
+        self.signal_out("target", ToolTarget, self._calc_target, ticket)
+        self.signal_out("reference", ToolPose, self._calc_reference, ticket)
+        self.signal_out("progress", Progress, self._calc_progress, ticket)
 
     @property
     def duration(self) -> float:
@@ -119,8 +119,8 @@ class ProcedurePlayer(Block):
         """When each posture is reached in s, (n,); 0 for those played before."""
         return np.concatenate([np.zeros(self._first), self._times])
 
-    def _pose(self, time: float) -> list[float]:
-        """p_WT, n_WT, n_WI (9) at a time."""
+    def target(self, time: float) -> ToolTarget:
+        """The tool's pose at a time in s."""
         n = int(np.searchsorted(self._times, time))
         if n == 0 or n == len(self._times):
             x = self._x[min(n, len(self._x) - 1)]
@@ -130,14 +130,15 @@ class ProcedurePlayer(Block):
             x = self._x[n - 1] + share * (self._x[n] - self._x[n - 1])
         c, h = np.empty((POINTS, 3)), self._snake.half_pitch
         corners(x, h, self._snake.tool_offset, c)
-        return [*c[7].tolist(), *link_axis(c, 5, h), *link_axis(c, 3, h)]
+        return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
 
-    def _calc_target(self, context: Any) -> Sequence[float]:
-        return self._pose(context.get_time() + self._params.lead)
+    def _calc_target(self, context: Any) -> np.ndarray:
+        return flat(self.target(context.get_time() + self._params.lead))
 
-    def _calc_reference(self, context: Any) -> Sequence[float]:
-        return self._pose(context.get_time())[:6]
+    def _calc_reference(self, context: Any) -> np.ndarray:
+        target = self.target(context.get_time())
+        return flat(ToolPose(target.p, target.n))
 
-    def _calc_progress(self, context: Any) -> Sequence[float]:
+    def _calc_progress(self, context: Any) -> list[float]:
         reached = int(np.searchsorted(self._times, context.get_time() + 1e-9, "right"))
         return [float(self._first + max(reached - 1, 0))]

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from diagrams.common.cli import main
+from diagrams.common.cli import COMMANDS, main
 from diagrams.common.scenario import scenario_files
 
 SHORT = ["--duration", "0.2", "--no-replay"]
@@ -122,30 +122,30 @@ def test_the_module_is_the_command_line_and_teaches():
 
 def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     from diagrams.common.run import run_scenario
-    from diagrams.common.scenario import load_scenario
-    from systems.motion.endoscope import Endoscope
+    from diagrams.studies import load_scenario
+    from systems.motion.joint_commands import JointCommands
 
-    follow = Endoscope._update
+    follow = JointCommands._update
 
     def broken(self, context):
         if context.get_time() > 0.3:
-            raise RuntimeError("the camera fell off")
+            raise RuntimeError("the arm fell off")
         return follow(self, context)
 
-    monkeypatch.setattr(Endoscope, "_update", broken)
+    monkeypatch.setattr(JointCommands, "_update", broken)
     scenario = load_scenario("gauze_static", duration=1.0)
     run = run_scenario(scenario, tmp_path, with_replay=False)
-    assert "the camera fell off" in run.error
+    assert "the arm fell off" in run.error
     log = np.genfromtxt(tmp_path / "signals.csv", delimiter=",", names=True)
     assert 0.2 < log["time"][-1] < 0.4
     metrics = json.loads((tmp_path / "metrics.json").read_text())
-    assert "the camera fell off" in metrics["error"]
+    assert "the arm fell off" in metrics["error"]
 
 
 def test_an_interruption_before_the_run_is_no_traceback(monkeypatch, capsys):
     def interrupted(arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("diagrams.common.cli.run_command", interrupted)
+    monkeypatch.setitem(COMMANDS, "run", interrupted)
     assert main(["run", "gauze_static"]) == 130
     assert "interrupted before the run began" in capsys.readouterr().err

@@ -1,17 +1,20 @@
 """The six navigation scenarios must show what the thesis promises, in the full loop."""
 
-import functools
 import json
 
 import numpy as np
 import pytest
 
+from diagrams.common.plots import png
 from diagrams.common.run import Run, run_scenario, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
+from diagrams.common.scenario import ScenarioError
 from diagrams.navigation.figures import thesis_figures
 from diagrams.navigation.plots import plots
 from diagrams.navigation.scenario import outruns
+from diagrams.studies import load_scenario
+from plants.turtlebot.turtlebot import RobotState
 from systems.switching.switching_state import MODES
+from tests.runs import run
 
 NAMES = ("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd")
 KEYS = {
@@ -20,22 +23,14 @@ KEYS = {
 }
 
 
-@functools.cache
-def run(name: str, *overrides: str) -> Run:
-    """One run of each scenario serves all tests."""
-    result = simulate(load_scenario(f"nav_{name}", list(overrides)))
-    assert not result.error
-    return result
-
-
 def modes(r: Run) -> set[str]:
     """The planner's states in a run."""
-    return {MODES[int(m)] for m in np.round(r.matrix("planner.mode")[:, 0])}
+    return {MODES[int(m)] for m in np.round(r.planner.mode.state)}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_scenario_arrives_without_collision(name):
-    figures = run(name).metrics
+    figures = run(f"nav_{name}").metrics
     assert set(figures) >= KEYS
     assert figures["reached"] and not figures["collided"]
     assert figures["min_clearance"] > 0.05
@@ -44,22 +39,23 @@ def test_every_scenario_arrives_without_collision(name):
 
 
 def test_the_local_minimum_stops_the_classical_method_alone():
-    classical = run("local_minimum", "planner=classical")
+    classical = run("nav_local_minimum", "planner=classical")
     assert not classical.metrics["reached"] and not classical.metrics["collided"]
-    speed = classical.matrix("robot.state")[:, 3]
-    assert np.abs(speed[-40:]).max() < 0.01  # it stands still for ever
-    assert abs(classical.matrix("robot.state")[-1, 0] - 5.0) < 0.05  # in the middle
-    assert run("local_minimum").metrics["reached"]
+    robot = classical.robot.state
+    assert np.abs(robot.v[-40:]).max() < 0.01  # it stands still for ever
+    assert abs(robot.x[-1] - 5.0) < 0.05  # in the middle
+    assert run("nav_local_minimum").metrics["reached"]
 
 
 def test_the_trap_is_left_round_its_group():
-    assert {"group", "leave", "attractive"} <= modes(run("u_trap"))
-    assert not run("u_trap", "planner=classical").metrics["reached"]
+    assert {"group", "leave", "attractive"} <= modes(run("nav_u_trap"))
+    assert not run("nav_u_trap", "planner=classical").metrics["reached"]
 
 
 def test_limits_of_the_robot_hold():
-    r = run("u_trap")
-    v, omega = r.matrix("robot.state")[:, 3:].T
+    r = run("nav_u_trap")
+    robot = r.robot.state
+    v, omega = robot.v, robot.omega
     assert np.abs(v).max() < 0.5 + 1e-6 and np.abs(omega).max() < 1.8 + 1e-6
     period = r.study.log_period
     assert np.abs(np.diff(v)).max() < 1.0 * period + 1e-6
@@ -67,15 +63,15 @@ def test_limits_of_the_robot_hold():
 
 
 def test_the_statechart_passes_one_standing_obstacle():
-    r = run("one_static", "planner=statechart")
+    r = run("nav_one_static", "planner=statechart")
     assert r.metrics["reached"]
-    states = np.round(r.matrix("planner.mode")[:, 0]).astype(int).tolist()
+    states = np.round(r.planner.mode.state).astype(int).tolist()
     assert list(dict.fromkeys(states)) == [0, 1, 2] and states[-1] == 0
 
 
 def test_noise_is_repeatable_and_survived():
     noise = ("perception.position_noise=0.02", "perception.velocity_noise=0.05")
-    first = run("three_moving", *noise)
+    first = run("nav_three_moving", *noise)
     again = simulate(load_scenario("nav_three_moving", list(noise)))
     assert first.metrics["reached"]
     for name, column in first.signals.items():
@@ -84,7 +80,7 @@ def test_noise_is_repeatable_and_survived():
 
 def test_the_gap_is_passed_with_noise():
     noise = ("perception.position_noise=0.01", "perception.velocity_noise=0.05")
-    r = run("local_minimum", *noise)
+    r = run("nav_local_minimum", *noise)
     assert r.metrics["reached"] and not r.metrics["collided"]
 
 
@@ -103,12 +99,20 @@ def test_a_faster_obstacle_is_told_and_the_robot_does_its_best():
     [
         (["goal=[4.0, 0.3]"], r"goal=.* lies inside obstacles\[0\]"),
         (["start=[3.4, 0.1]"], r"start=.* inside the safety circle of obstacles\[0\]"),
-        (["perception.vision=0.6"], r"R_i <|must be greater"),
+        (["perception.vision=0.6"], r"exceeds perception.vision=0.6 m.*expected R_i <"),
+        (["perception.vision=0.3"], r"perception.vision=0.3 m: expected > 0.38, robot"),
         (["goal=[.nan, 0.0]"], r"finite"),
-        (["start=[0.0]"], r"start=\[0.0\]: expected 2"),
-        (["planner=magic"], r"planner='magic': choose from|did you mean"),
-        (["robot.radius=0.0"], r"radius=0.0 must be positive"),
-        (["reach=0.0"], r"reach=0.0 m: expected > 0"),
+        (["goal=[0.0, 0.0]"], r"goal=.*: 0 m from start=.*, expected more than reach"),
+        (["goal=[1000.0, 0.0]"], r"goal=.* m: expected 2 numbers .* <= 100"),
+        (["start=[0.0]"], r"start=\[0.0\] m: expected 2"),
+        (["planner=magic"], r"planner='magic': expected one of switching"),
+        (["compare=[classic]"], r"compare=\['classic'\]: expected one of"),
+        (["robot.radius=0.0"], r"robot.radius=0.0 m: expected >= 0.05"),
+        (["reach=0.0"], r"reach=0.0 m: expected >= 0.01"),
+        (
+            ["switching.deceleration=1000.0"],
+            r"switching.deceleration=.* m/s\^2: expected",
+        ),
         (["crowd.people=3"], r"expected one of them"),
         (["switching.margin=[0.1]"], r"did you mean 'margins'|switching.margin"),
     ],
@@ -119,14 +123,33 @@ def test_bad_input_is_refused(overrides, message):
 
 
 def test_negative_radius_is_refused():
-    scenario = load_scenario("nav_one_static")
-    scenario.obstacles[0].radius = -0.5
-    with pytest.raises(ScenarioError, match=r"radius=-0.5 m must be positive"):
+    scenario = load_scenario("nav_three_moving")
+    scenario.obstacles[2].radius = -0.5
+    with pytest.raises(ScenarioError, match=r"obstacles\[2\].radius=-0.5 m: expected"):
         simulate(scenario)
 
 
+def test_a_world_without_obstacles_has_no_clearance():
+    r = run("nav_one_static", "obstacles=[]", "compare=[]")
+    assert r.metrics["reached"] and r.metrics["min_clearance"] is None
+    assert r.metrics["path_ratio"] == pytest.approx(1.0, abs=0.02)
+    assert not r.obstacles.rows.radius.any()
+    for figure in plots(r).values():
+        png(figure)
+
+
+def test_signals_have_the_names_of_their_declarations():
+    r = run("nav_one_static")
+    assert list(r.signals)[1:6] == [f"robot.state.{n}" for n in RobotState._fields]
+    assert list(r.signals)[6] == "obstacles.rows.x_0"
+    obstacles, robot = r.obstacles.rows, r.robot.state
+    assert obstacles.x.shape == (*robot.x.shape, 24)
+    np.testing.assert_array_equal(obstacles.radius[:, 0], 0.5)
+    np.testing.assert_array_equal(robot.theta, r.signals["robot.state.theta"])
+
+
 def test_plots_of_two_methods_and_of_the_thesis():
-    figures = plots(run("local_minimum"))
+    figures = plots(run("nav_local_minimum"))
     assert {"path", "motion", "potential", "figure_04", "figure_12"} <= set(figures)
     labels = [text.get_text() for text in figures["path"].legends[0].get_texts()]
     assert labels[0].startswith("switching: arrives")

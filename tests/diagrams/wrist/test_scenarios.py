@@ -1,24 +1,18 @@
 """The wrist's scenarios must show the issue's figures, with the arm in the loop."""
 
 from dataclasses import replace
-import functools
-import json
 
 import numpy as np
 import pytest
 
 from diagrams.bedside.wrist_metrics import last_above, settled
-from diagrams.common.run import Run, simulate
-from diagrams.common.scenario import ScenarioError, load_scenario
-
-
-@functools.cache
-def run(name: str, *overrides: str) -> Run:
-    """One run of each scenario serves all tests."""
-    result = simulate(load_scenario(name, overrides))
-    assert not result.error
-    json.dumps(result.metrics, allow_nan=False)
-    return result
+from diagrams.common.case import Case
+from diagrams.common.run import prepare, simulate
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import load_scenario
+from diagrams.wrist.plots import plots
+from diagrams.wrist.scenario import UNLIMITED
+from tests.runs import run
 
 
 def test_arcs_about_a_wrong_guess():
@@ -61,13 +55,13 @@ def test_insufflation():
 
 def test_known_fulcrum_under_breathing():
     scenario = load_scenario("pwe_breathing", ["wrist=known"], duration=8.0)
-    figures = simulate(replace(scenario, measure_from=2.0)).metrics
+    figures = simulate(Case(replace(scenario, measure_from=2.0))).metrics
     assert figures["rms_lateral_force"] < 0.03
 
 
 def test_off_stands_still_for_the_wall_is_loaded():
     result = run("pwe_arc", "wrist=off")
-    tip = result.matrix("robot.tool")[:, 3:]
+    tip = result.robot.tool.tip
     assert result.metrics["max_lateral_force"] > 5.0
     assert np.ptp(tip[-600:], axis=0).max() < 1e-4
     assert result.metrics["time_frozen"] > 10.0
@@ -75,50 +69,52 @@ def test_off_stands_still_for_the_wall_is_loaded():
 
 def test_a_lost_sensor_stops_the_task_until_it_is_back():
     overrides = ["tool_wrench.lost=[7.0, 8.0]"]
-    result = simulate(load_scenario("pwe_arc", overrides, duration=10.0))
-    t, code = result.signals["time"], result.signals["wrist.permission.code"]
+    result = simulate(Case(load_scenario("pwe_arc", overrides, duration=10.0)))
+    t, code = result.signals["time"], result.wrist.permission.code
     assert np.all(code[(t > 7.1) & (t < 8.0)] == 9.0)
     assert np.all(code[t > 8.4] == 0.0)
-    tip = result.matrix("robot.tool")[:, 3:]
+    tip = result.robot.tool.tip
     still = (t > 7.3) & (t < 8.0)
     assert np.ptp(tip[still], axis=0).max() < 2e-4
     assert np.ptp(tip[t > 8.5], axis=0).max() > 5e-3
 
 
-def test_gauze_on_a_patient_who_breathes():
-    result = run("gauze_breathing")
-    figures = result.metrics
-    assert figures["reached"] and not figures["contact"]
-    assert figures["min_tool_clearance"] >= 0.004
-    assert figures["rms_lateral_force"] <= 0.3
-    assert figures["final_tip_error"] <= 2e-3
-    assert [stop["reason"] for stop in figures["stops"]] == ["probing the wall"]
-
-
 def test_same_seed_same_figures():
     one, two = (
-        simulate(load_scenario("pwe_breathing", duration=1.0)).matrix("wrist.fulcrum")
-        for _ in range(2)
+        simulate(Case(load_scenario("pwe_breathing", duration=1.0))) for _ in range(2)
     )
-    np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(one.wrist.fulcrum.p, two.wrist.fulcrum.p)
 
 
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("wrist=passive", "choose from pwe, spring, off, known"),
-        ("first_guess=[0.2, 0.0, 0.0]", "at most 0.05 m"),
-        ("abdomen.stiffness=-500.0", r"abdomen.stiffness=-500.0 must be in"),
-        ("fulcrum_estimator.stiffness=-1.0", "no abdominal"),
+        ("wrist=passive", "expected one of pwe, spring, off, known"),
+        ("first_guess=[0.2, 0.0, 0.0]", "first_guess=.* m: .*<= 0.05"),
+        ("abdomen.stiffness=-500.0", "abdomen.stiffness=-500.0 N/m: expected >= 10"),
+        ("fulcrum_estimator.stiffness=-1.0", "fulcrum_estimator.stiffness=-1.0 N/m"),
         ("tool_wrench.period=0.01", "share their instants"),
         ("tool_wrench.frame=7", "expected a text"),
-        ("compare=[pew]", "compare='pew'"),
-        ("wall_motion.wave=square", "'sine' or 'ventilator'"),
+        ("compare=[pew]", "compare=.'pew'.: expected one of pwe"),
+        ("wall_motion.wave=square", "wave='square': expected one of sine, ventilator"),
     ],
 )
 def test_bad_input(override, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario("pwe_arc", [override])
+
+
+def test_modes_that_are_compared_are_run_at_the_highest_force_limit():
+    scenario = load_scenario(
+        "pwe_arc", ["compare=[off, known]", "measure_from=0"], duration=0.1
+    )
+    run = simulate(prepare(scenario))
+    assert list(run.case.companions) == ["off", "known"]
+    for mode, beside in run.case.companions.items():
+        assert beside.scenario.wrist == mode
+        assert beside.scenario.passive_wrist.force_limit == UNLIMITED
+    labels = plots(run)["forces"].axes[0].get_legend().get_texts()
+    assert len(labels) == 3
 
 
 def test_settled_and_last_above():
@@ -130,6 +126,6 @@ def test_settled_and_last_above():
 
 
 def test_a_late_sensor_costs_little_when_force_and_pose_belong_together():
-    figures = run("pwe_breathing", "tool_wrench.delay=2", "compare=[]").metrics
+    figures = run("pwe_breathing", "tool_wrench.delay=2").metrics
     assert figures["rms_lateral_force"] < 0.15
     assert figures["max_lateral_force"] < 1.0

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from plants.abdomen.wall_motion import WallMotionParams, wave
+from systems.common.parameter import check
 
 
 @pytest.mark.parametrize("kind", ["sine", "ventilator"])
@@ -26,7 +27,7 @@ def test_ventilator_breathes_in_for_two_fifths():
 
 def test_the_wall_steps_in_about_20_ms():
     run = simulate(load_scenario("pwe_step", duration=5.1))
-    t, x = run.signals["time"], run.signals["wall.fulcrum.x"]
+    t, x = run.signals["time"], run.wall.fulcrum.p[:, 0]
     after = t > 5.0 + 0.5 / 120.0
     assert x[t < 5.0].max() < 1e-6
     assert np.interp(5.025, t[after], x[after]) > 0.95 * 0.018
@@ -46,8 +47,14 @@ def test_insufflation_lifts_and_stiffens():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"wave": "square"}, "expected 'sine' or 'ventilator'"),
-        ({"breathing": [0.2, 0.0, 0.0]}, "at most 0.05 m"),
+        (
+            {"wave": "square"},
+            "wall_motion.wave='square': expected one of sine, ventilator",
+        ),
+        (
+            {"breathing": [0.2, 0.0, 0.0]},
+            "breathing=.* m: expected 3 numbers >= -0.05 and <= 0.05",
+        ),
         ({"breathing": [float("nan"), 0.0, 0.0]}, "breathing="),
         ({"rate": 0.0}, "rate=0.0 Hz"),
         ({"stiffening": -1.0}, "stiffening=-1.0"),
@@ -55,4 +62,4 @@ def test_insufflation_lifts_and_stiffens():
 )
 def test_bad_input(change, message):
     with pytest.raises(ValueError, match=message):
-        WallMotionParams(**change).check()
+        check(WallMotionParams(**change))

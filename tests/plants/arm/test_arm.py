@@ -256,9 +256,9 @@ def test_set_point_takes_less_than_ten_microseconds():
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        (ArmParams(kp=[1.0] * 6), "arm.kp has 6 gains, expected 7"),
-        (ArmParams(kd=[1.0] * 6 + [-2.0]), r"arm.kd\[6\]=-2.0 must be > 0"),
-        (ArmParams(kp=[math.nan] * 7), r"arm.kp\[0\]=nan must be > 0"),
+        (ArmParams(kp=[1.0] * 6), "arm.kp=.* N m/rad: expected 7 numbers > 0"),
+        (ArmParams(kd=[1.0] * 6 + [-2.0]), r"arm.kd=.*-2.0. .*7 numbers > 0"),
+        (ArmParams(kp=[math.nan] * 7), r"arm.kp=\[nan, .*7 numbers > 0"),
     ],
 )
 def test_bad_gains_are_refused(params, message):

@@ -45,9 +45,9 @@ def test_sensor_carries_the_instruments_weight_at_rest(make_scene, gauze):
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        (InstrumentParams(length=0.5), "instrument.length=0.5 must be in .* 0.45"),
-        (InstrumentParams(diameter=0.02), "instrument.diameter=0.02 must be in"),
-        (InstrumentParams(gauze_mass=-1.0), "instrument.gauze_mass=-1.0 .* nearest 0"),
+        (InstrumentParams(length=0.5), "instrument.length=0.5 m: .*<= 0.45"),
+        (InstrumentParams(diameter=0.02), "instrument.diameter=0.02 m: expected"),
+        (InstrumentParams(gauze_mass=-1.0), "instrument.gauze_mass=-1.0 kg: .*>= 0"),
         (InstrumentParams(mount_mass=math.nan), "instrument.mount_mass=nan"),
     ],
 )

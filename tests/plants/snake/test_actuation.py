@@ -17,8 +17,9 @@ from plants.snake.kinematics import module_transform
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.two_wires import all_solutions, solve
+from systems.common.parameter import check
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 R, E, H = PARAMS.ball_radius, PARAMS.plate_thickness, PARAMS.half_pitch
 D = PARAMS.face
 
@@ -115,7 +116,7 @@ def test_two_wires_have_two_solutions_of_which_one_counts():
 def test_where_the_inequality_fails_two_postures_share_two_lengths():
     loose = SnakeParams(ball_radius=2e-3, half_pitch=3.6e-3)
     with pytest.raises(ValueError, match=r"R/\(2d\)"):
-        loose.check()
+        check(loose)
     rng = np.random.default_rng(0)
     both = 0
     for _ in range(1000):

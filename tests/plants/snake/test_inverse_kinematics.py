@@ -17,8 +17,9 @@ from plants.snake.kinematics import forward
 from plants.snake.last_module import bend_for_radius, entry, last_module, meridian
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import bends_of, posture_of
+from systems.common.parameter import check
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 
 
 def random_bends(count, seed=0, params=PARAMS):
@@ -41,7 +42,7 @@ def intermediate(x5, params=PARAMS):
 
 @pytest.mark.parametrize("max_bend", [math.pi / 4, 0.6, 0.25])
 def test_every_reachable_pose_has_its_posture(max_bend):
-    params = SnakeParams(max_bend=max_bend).check()
+    params = check(SnakeParams(max_bend=max_bend))
     q = random_bends(20_000, params=params)[:, :5]
     p, n = intermediate(posture_of(q), params)
     answer = positioning(p, n, params)

@@ -9,8 +9,9 @@ from plants.snake.jacobian import jacobian
 from plants.snake.kinematics import centreline, forward, frames, module_transform
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import bends_of, posture_of
+from systems.common.parameter import check
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 H = PARAMS.half_pitch
 
 
@@ -161,15 +162,15 @@ def test_a_wrong_shape_is_refused():
     [
         ({"ball_radius": 2e-3, "half_pitch": 3.6e-3}, r"tan\(max_bend/2\).*R/\(2d\)"),
         ({"half_pitch": 2.9e-3}, "balls of a module overlap"),
-        ({"max_bend": 1.0}, "max_bend=1.0000 rad must lie in"),
+        ({"max_bend": 1.0}, "max_bend=1.0 rad: expected >= 0.01 and <= 0.785398"),
         ({"body_radius": 8e-3}, "plates touch at the rim"),
         ({"travel": [0.1, 0.0]}, "travel"),
-        ({"first_azimuths": [0.0, 0.0, 1.0]}, "two wires 0.0 deg apart"),
-        ({"first_azimuths": [0.0]}, "3 entries"),
-        ({"plate_thickness": 0.0}, "plate_thickness=0.0 m must be > 0"),
+        ({"first_azimuths": [0.0, 0.0, 1.0]}, "two are 0.0"),
+        ({"first_azimuths": [0.0]}, "expected 3 numbers"),
+        ({"plate_thickness": 0.0}, "plate_thickness=0.0 m: expected >= 0.0001"),
         ({"tool_offset": -1.0}, "tool_offset"),
     ],
 )
 def test_geometry_that_cannot_work_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
-        SnakeParams(**change).check()
+        check(SnakeParams(**change))

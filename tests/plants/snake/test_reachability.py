@@ -10,8 +10,9 @@ from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import bends_of, posture_of
 from plants.snake.reachability import refusal
+from systems.common.parameter import check
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -103,7 +104,7 @@ def test_a_pose_past_one_limit_is_stopped_by_that_limit(limit, q5):
 
 
 def test_an_axis_that_leans_too_far_is_turned():
-    params = SnakeParams(max_bend=0.5).check()
+    params = check(SnakeParams(max_bend=0.5))
     n = [math.sin(2.3), 0.0, math.cos(2.3)]
     answer = refusal([0.01, 0.0, 0.03], n, params)
     assert answer is not None

@@ -11,7 +11,7 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.posture import bends_of
 from plants.snake.tension import length_jacobian, tensions, torques_against
 
-PARAMS = SnakeParams().check()
+PARAMS = SnakeParams()
 
 
 def random_angles(rng):

@@ -35,6 +35,15 @@ def test_columns_may_stand_in_any_order_beside_others(tmp_path):
     assert points[0].tolist() == [0.3, 0.2, -0.1]
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_byte_order_mark_is_no_part_of_the_header(tmp_path, encoding):
+    path = tmp_path / "r.csv"
+    path.write_text("t,x,y,z\n0,0.3,0.2,-0.1\n1,0.3,0.2,-0.2\n", encoding=encoding)
+    times, points = load_recording(path)
+    assert times.tolist() == [0.0, 1.0]
+    assert points[1].tolist() == [0.3, 0.2, -0.2]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

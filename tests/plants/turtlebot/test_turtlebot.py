@@ -3,10 +3,19 @@
 from math import cos, sin
 
 import numpy as np
-from pydrake.systems.analysis import Simulator
+from pydrake.systems.analysis import (
+    ApplySimulatorConfig,
+    Simulator,
+    SimulatorConfig,
+)
 import pytest
 
-from plants.turtlebot.turtlebot import TurtlebotParams, make_turtlebot
+from plants.turtlebot.turtlebot import (
+    Command,
+    RobotState,
+    TurtlebotParams,
+    make_turtlebot,
+)
 
 
 def drive(speed, rate, duration, start=(1.0, 2.0, 0.5)):
@@ -39,5 +48,25 @@ def test_it_drives_circles():
 
 
 def test_bad_parameters_are_refused():
-    with pytest.raises(ValueError, match=r"acceleration=-1.0 must be positive"):
-        make_turtlebot(TurtlebotParams(acceleration=-1.0), [0.0, 0.0, 0.0])
+    for change, message in (
+        ({"acceleration": -1.0}, r"robot.acceleration=-1.0 m/s\^2: expected > 0"),
+        ({"radius": 1e9}, r"robot.radius=1000000000.0 m: expected >= 0.05 and <= 1;"),
+        ({"lag": 1e-4}, r"robot.lag=0.0001 s: expected >= 0.02"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make_turtlebot(TurtlebotParams(**change), [0.0, 0.0, 0.0])
+
+
+def test_the_shortest_lag_is_stable_at_the_step_of_the_navigation():
+    params = TurtlebotParams(lag=0.02, acceleration=10.0)
+    robot = make_turtlebot(params, [0.0, 0.0, 0.0])
+    context = robot.CreateDefaultContext()
+    robot.get_input_port().FixValue(context, Command(0.4, 0.3))
+    simulator = Simulator(robot, context)
+    config = SimulatorConfig(
+        integration_scheme="runge_kutta3", max_step_size=0.05, use_error_control=False
+    )
+    ApplySimulatorConfig(config, simulator)
+    simulator.AdvanceTo(3.0)
+    state = RobotState(*robot.get_output_port().Eval(simulator.get_context()))
+    assert (state.v, state.omega) == pytest.approx((0.4, 0.3), abs=0.01)

@@ -11,17 +11,20 @@ from systems.auto_guidance.backward_movement import (
     BackwardMovement,
     BackwardMovementParams,
 )
-from systems.common.signals import GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
+from systems.common.signal import example, flat
+from systems.common.signals import Estimate, Guide
 from tests.loosely import loosely
 
 backward_movement = loosely(module.backward_movement, module.constants)
 contact_velocity = loosely(module.contact_velocity)
 DT = 1.0 / 60.0
-TIP_GUIDE = [*GUIDE_EXAMPLE[:8], 1.0, *GUIDE_EXAMPLE[9:]]
+GUIDE, OBSTACLE = example(Guide), example(Estimate)
+TIP_GUIDE = GUIDE._replace(l_over_L=1.0)
+NOTHING = Estimate(*[(nan,) * 3] * 4, *[nan] * 5)
 
 
 def moving(v):
-    return [*OBSTACLE_EXAMPLE[:3], *v, *OBSTACLE_EXAMPLE[6:]]
+    return OBSTACLE._replace(v=v)
 
 
 def settle(params, v3, v, seconds):
@@ -54,14 +57,14 @@ def test_printed_form_grows_while_the_obstacle_moves_and_stays_when_it_stops():
 
 def test_contact_velocity_is_that_of_the_material_point():
     # O hangs along -z; half way down it turns at half the speed, slides at all of it.
-    obstacle = [0, 0, -0.1, 0.04, 0, 0.02, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0]
-    guide = [*GUIDE_EXAMPLE[:8], 0.5, *GUIDE_EXAMPLE[9:]]
+    obstacle = OBSTACLE._replace(p=(0, 0, -0.1), v=(0.04, 0, 0.02), fulcrum=(0, 0, 0))
+    guide = GUIDE._replace(l_over_L=0.5)
     np.testing.assert_allclose(contact_velocity(guide, obstacle), (0.02, 0, 0.02))
 
 
 @pytest.mark.parametrize(
     "obstacle",
-    [[nan] * 17, [*OBSTACLE_EXAMPLE[:15], 0.0, 9.0], moving((nan, 0.0, 0.0))],
+    [NOTHING, OBSTACLE._replace(known=0.0, age=9.0), moving((nan, 0.0, 0.0))],
 )
 def test_dies_out_without_a_usable_obstacle(obstacle):
     params = BackwardMovementParams()
@@ -72,10 +75,10 @@ def test_dies_out_without_a_usable_obstacle(obstacle):
 def test_block_output_is_the_step_that_its_update_makes():
     dut = BackwardMovement()
     context = dut.CreateDefaultContext()
-    dut.GetInputPort("guide").FixValue(context, GUIDE_EXAMPLE)
-    dut.GetInputPort("obstacle").FixValue(context, OBSTACLE_EXAMPLE)
+    dut.GetInputPort("guide").FixValue(context, flat(GUIDE))
+    dut.GetInputPort("obstacles").FixValue(context, flat(OBSTACLE))
     expected = backward_movement(
-        BackwardMovementParams(), (0, 0, 0), DT, GUIDE_EXAMPLE, OBSTACLE_EXAMPLE
+        BackwardMovementParams(), (0, 0, 0), DT, GUIDE, OBSTACLE
     )
     np.testing.assert_allclose(dut.GetOutputPort("v3").Eval(context), expected)
     Simulator(dut, context).AdvanceTo(0.5 * DT)
@@ -87,9 +90,10 @@ def test_block_output_is_the_step_that_its_update_makes():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"form": "paper"}, "form='paper' must be one of corrected, printed"),
-        ({"gain": -2.0}, r"gain=-2.0 must be finite and > 0"),
-        ({"period": 0.0}, r"period=0.0 must be finite and > 0"),
+        ({"form": "paper"}, "form='paper': expected one of corrected, printed"),
+        ({"gain": -2.0}, r"backward_movement.gain=-2.0 1/s: expected > 0 and <= 1000"),
+        ({"gain": 1e9}, r"gain=1000000000.0"),
+        ({"period": 0.0}, r"period=0.0 s: expected > 0"),
     ],
 )
 def test_bad_parameters(change, message):

@@ -16,13 +16,10 @@ from systems.auto_guidance.fuzzy_arbiter import (
     WEIGHTS,
     FuzzyArbiter,
     FuzzyArbiterParams,
+    Weights,
 )
-from systems.common.signals import (
-    GUIDE_EXAMPLE,
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
-)
+from systems.common.signal import example, flat
+from systems.common.signals import Estimate, Guide, RobotTool
 from tests.loosely import loosely
 
 arbitrate = loosely(module.arbitrate, module.constants)
@@ -33,6 +30,9 @@ decision_labels = loosely(module.decision_labels, module.constants)
 label_weights = loosely(module.label_weights, module.constants)
 quadrants = loosely(module.quadrants)
 PARAMS = FuzzyArbiterParams()
+GUIDE, ROBOT, OBSTACLE = example(Guide), example(RobotTool), example(Estimate)
+TARGET = OBSTACLE._replace(p=(0.05, 0.03, -0.12), fulcrum=(0.1, 0.03, 0.0))
+NONE = Weights(0.0, 0.0, 0.0)
 DT = 1.0 / 60.0
 
 # Table I as the paper prints it: v_R across, v_O down.
@@ -132,11 +132,11 @@ def test_weights_between_the_cells_are_scikit_fuzzys_inference():
 
 
 def test_axes_point_to_the_obstacle_and_to_the_goals_side():
-    guide = [0, 0, -0.1, 0, 0.02, -0.1, 0.02, 1, 1, 0.05, 0.01, -0.1]
+    guide = Guide((0, 0, -0.1), (0, 0.02, -0.1), 0.02, 1, 1, (0.05, 0.01, -0.1))
     x, y = axes(guide)
     np.testing.assert_allclose((x, y), ((1, 0, 0), (0, 1, 0)), atol=1e-12)
     # The goal straight behind the obstacle, and tools whose axes touch.
-    for odd in ([*guide[:9], 0, 0.05, -0.1], [*guide[:3], *guide[:3], *guide[6:]]):
+    for odd in (guide._replace(M_Rf=(0, 0.05, -0.1)), guide._replace(M_O=guide.M_R)):
         x, y = map(np.array, axes(odd))
         assert abs(x @ y) < 1e-12
         assert np.linalg.norm(x) == pytest.approx(1) == np.linalg.norm(y)
@@ -144,9 +144,9 @@ def test_axes_point_to_the_obstacle_and_to_the_goals_side():
 
 def meeting(v_o, rho=0.012):
     """The tip at G_R's proportion 1, O's tip `rho` off along y, the goal along x."""
-    guide = [0, 0, -0.1, 0, rho, -0.1, rho, 1, 1, 0.05, 0, -0.1]
-    obstacle = [0, rho, -0.1, *v_o, 0, 0, 0, 0, 0.1, 0, 3e-4, 3e-3, 0.05, 1, 0]
-    return guide, obstacle
+    p_o = (0, rho, -0.1)
+    guide = Guide((0, 0, -0.1), p_o, rho, 1, 1, (0.05, 0, -0.1))
+    return guide, OBSTACLE._replace(p=p_o, v=v_o, fulcrum=(0, 0.1, 0))
 
 
 def test_opposed_velocities_bring_in_corrections_and_retreat():
@@ -189,9 +189,9 @@ def test_a_standing_or_trembling_obstacle_is_left_to_the_field(speed):
 
 def test_equation_6():
     velocities = [(0.01, 0.02, 0.0), (-0.004, 0.0, 0.0), (0.0, -0.02, 0.01)]
-    weights = (1.0, 0.5, 0.25)
+    weights = Weights(1.0, 0.5, 0.25)
     v_tip = commanded_velocity(
-        FuzzyArbiterParams(max_acceleration=100.0),
+        FuzzyArbiterParams(max_acceleration=10.0),
         (0, 0, 0),
         DT,
         weights,
@@ -206,7 +206,7 @@ def test_speed_and_acceleration_are_bounded():
     fast = [(0.5, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
     v = (0.0, 0.0, 0.0)
     for k in range(10):
-        v = commanded_velocity(PARAMS, v, DT, (1, 0, 0), fast, 1.0)
+        v = commanded_velocity(PARAMS, v, DT, Weights(1, 0, 0), fast, 1.0)
         expected = min(PARAMS.max_speed, (k + 1) * DT * PARAMS.max_acceleration)
         assert v[0] == pytest.approx(expected)
 
@@ -214,14 +214,15 @@ def test_speed_and_acceleration_are_bounded():
 @pytest.mark.parametrize("lost", ["obstacle", "target", "nan v1", "nan guide", "nan O"])
 def test_comes_to_rest_smoothly_when_something_is_not_known(lost):
     v1 = (nan, 0.0, 0.0) if lost == "nan v1" else (0.05, 0.0, 0.0)
-    guide = [nan] * 12 if lost == "nan guide" else GUIDE_EXAMPLE
-    obstacle, target = list(OBSTACLE_EXAMPLE), list(TARGET_EXAMPLE)
-    if lost == "nan O":
-        obstacle = [nan] * 17
+    guide, obstacle, target = GUIDE, OBSTACLE, TARGET
+    if lost == "nan guide":
+        guide = guide._replace(s=nan)
+    elif lost == "nan O":
+        obstacle = Estimate(*[(nan,) * 3] * 4, *[nan] * 5)
     elif lost == "obstacle":
-        obstacle[15] = 0.0
+        obstacle = obstacle._replace(known=0.0)
     elif lost == "target":
-        target[15] = 0.0
+        target = target._replace(known=0.0)
     zero = (0.0, 0.0, 0.0)
     v = (0.05, 0.02, 0.0)
     speeds = []
@@ -232,12 +233,12 @@ def test_comes_to_rest_smoothly_when_something_is_not_known(lost):
             DT,
             (v1, zero, zero),
             guide,
-            ROBOT_TOOL_EXAMPLE,
+            ROBOT,
             obstacle,
             target,
         )
         speeds.append(np.linalg.norm(v))
-        assert weights == (0.0, 0.0, 0.0) and np.isfinite(s)
+        assert weights == NONE and np.isfinite(s)
     start = np.hypot(0.05, 0.02)
     expected = [max(0.0, start - (k + 1) * DT) for k in range(8)]
     np.testing.assert_allclose(speeds, expected, atol=1e-12)
@@ -249,10 +250,10 @@ def fixed(dut):
         "v1": (0.05, 0.0, 0.0),
         "v2": (-0.01, 0.0, 0.0),
         "v3": (0.0, -0.01, 0.0),
-        "guide": GUIDE_EXAMPLE,
-        "robot_tool": ROBOT_TOOL_EXAMPLE,
-        "obstacle": OBSTACLE_EXAMPLE,
-        "target": TARGET_EXAMPLE,
+        "guide": flat(GUIDE),
+        "robot_tool": flat(ROBOT),
+        "obstacles": flat(OBSTACLE),
+        "target": flat(TARGET),
     }.items():
         dut.GetInputPort(name).FixValue(context, value)
     return context
@@ -266,10 +267,10 @@ def test_block_output_is_the_step_that_its_update_makes():
         (0.0, 0.0, 0.0),
         DT,
         ((0.05, 0, 0), (-0.01, 0, 0), (0, -0.01, 0)),
-        GUIDE_EXAMPLE,
-        ROBOT_TOOL_EXAMPLE,
-        OBSTACLE_EXAMPLE,
-        TARGET_EXAMPLE,
+        GUIDE,
+        ROBOT,
+        OBSTACLE,
+        TARGET,
     )
     np.testing.assert_allclose(dut.GetOutputPort("weights").Eval(context), weights)
     np.testing.assert_allclose(
@@ -284,10 +285,17 @@ def test_block_output_is_the_step_that_its_update_makes():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"table": "printed"}, "table='printed' must be one of literal, gated"),
-        ({"distances": [0.01, 0.02]}, "3 increasing values >= 0, for close, near, far"),
-        ({"distances": [0.03, 0.02, 0.05]}, "3 increasing values"),
-        ({"max_speed": 0.0}, r"max_speed=0.0 must be finite and > 0"),
+        ({"table": "printed"}, "table='printed': expected one of literal, gated"),
+        (
+            {"distances": [0.01, 0.02]},
+            r"distances=\[0.01, 0.02\] m: expected 3 numbers",
+        ),
+        ({"distances": [0.03, 0.02, 0.05]}, "distances=.*increasing numbers"),
+        (
+            {"max_speed": 0.0},
+            "fuzzy_arbiter.max_speed=0.0 m/s: expected > 0 and <= 0.5",
+        ),
+        ({"max_speed": 60.0}, "max_speed=60.0 m/s"),
         ({"max_acceleration": -1.0}, "max_acceleration=-1.0"),
         ({"closing_speed": nan}, "closing_speed=nan"),
         ({"contact_distance": -1.0}, "contact_distance=-1.0"),

@@ -9,11 +9,8 @@ import pytest
 
 from systems.auto_guidance import go_to_target as module
 from systems.auto_guidance.go_to_target import GoToTarget, GoToTargetParams
-from systems.common.signals import (
-    OBSTACLE_EXAMPLE,
-    ROBOT_TOOL_EXAMPLE,
-    TARGET_EXAMPLE,
-)
+from systems.common.signal import example, flat
+from systems.common.signals import Estimate, Guide, RobotTool
 from tests.loosely import loosely
 
 corrected_force = loosely(module.corrected_force, module.constants)
@@ -22,15 +19,18 @@ go_to_target = loosely(module.go_to_target, module.constants)
 guide_point = loosely(module.guide_point)
 AXES = GoToTargetParams(contact_distance=0.0)
 DT = 1.0 / 60.0
+ROBOT, OBSTACLE = example(RobotTool), example(Estimate)
+TARGET = OBSTACLE._replace(p=(0.05, 0.03, -0.12), fulcrum=(0.1, 0.03, 0.0))
+DOWNWARDS = RobotTool((0.0, 0.0, 0.0), (0.0, 0.0, -0.1))
 
 
-def estimate(p, g=(0.0, 0.1, 0.0), v=(0.0, 0.0, 0.0), known=1.0):
-    return [*p, *v, 0.0, 0.0, 0.0, *g, 3e-4, 3e-3, 0.05, known, 0.0]
+def estimate(p, g=(0.0, 0.1, 0.0), v=(0.0, 0.0, 0.0)):
+    return OBSTACLE._replace(p=tuple(p), v=tuple(v), fulcrum=g)
 
 
 def guide(m_r, m_o, goal, s=1.0, fraction=1.0):
     rho = float(np.linalg.norm(np.subtract(m_r, m_o)))
-    return [*m_r, *m_o, rho, s, fraction, *goal]
+    return Guide(m_r, m_o, rho, s, fraction, goal)
 
 
 # The tip 12 mm beside the obstacle, 20 mm from the goal, not in line.
@@ -41,22 +41,20 @@ DOWN = (0.0, 0.0, -1.0)
 def test_guide_point_and_its_target_in_a_scene_worked_out_by_hand():
     # R hangs along -z, O lies along x at z = -0.06, 0.02 in front: they come
     # closest 0.06 below G_R, and 0.05 along O.
-    tool = [0.0, 0.0, 0.0, 0.0, 0.0, -0.1]
     obstacle = estimate((0.05, 0.02, -0.06), g=(-0.05, 0.02, -0.06))
-    g = guide_point(tool, obstacle, (0.1, 0.0, -0.1), 0.1)
-    np.testing.assert_allclose(g[0:3], (0, 0, -0.06), atol=1e-12)
-    np.testing.assert_allclose(g[3:6], (0, 0.02, -0.06), atol=1e-12)
-    np.testing.assert_allclose(g[6:9], (0.02, 0.6, 0.5))
-    np.testing.assert_allclose(g[9:12], (0.06, 0, -0.06), atol=1e-12)
+    g = guide_point(DOWNWARDS, obstacle, (0.1, 0.0, -0.1), 0.1)
+    np.testing.assert_allclose(g.M_R, (0, 0, -0.06), atol=1e-12)
+    np.testing.assert_allclose(g.M_O, (0, 0.02, -0.06), atol=1e-12)
+    np.testing.assert_allclose((g.rho, g.s, g.l_over_L), (0.02, 0.6, 0.5))
+    np.testing.assert_allclose(g.M_Rf, (0.06, 0, -0.06), atol=1e-12)
 
 
 def test_guide_point_keeps_off_the_fulcrum():
     # O's shaft comes closest next to G_R.
-    tool = [0.0, 0.0, 0.0, 0.0, 0.0, -0.1]
     obstacle = estimate((0.02, 0.02, -0.1), g=(0.02, 0.0, 0.0))
-    g = guide_point(tool, obstacle, (0.1, 0.0, -0.1), 0.2)
-    assert g[7] == 0.2 and g[6] == pytest.approx(0.02)
-    np.testing.assert_allclose(g[0:3], (0, 0, -0.02), atol=1e-12)
+    g = guide_point(DOWNWARDS, obstacle, (0.1, 0.0, -0.1), 0.2)
+    assert g.s == 0.2 and g.rho == pytest.approx(0.02)
+    np.testing.assert_allclose(g.M_R, (0, 0, -0.02), atol=1e-12)
 
 
 def gradient_force(params, m_r, m_o, goal, k):
@@ -155,11 +153,11 @@ def test_printed_form_integrates_without_damping_and_saturates():
     params = GoToTargetParams(form="printed")
     target = estimate((0.05, 0.0, -0.1))
     far = estimate((0.0, 0.2, -0.1), g=(0.0, 0.2, 0.0))
-    tool = [0.0, 0.0, 0.0, 0.049, 0.0, -0.1]
+    tool = DOWNWARDS._replace(tip=(0.049, 0.0, -0.1))
     v, g = go_to_target(params, (0.01, 0.0, 0.0), DT, tool, far, target)
-    assert g[6] > params.influence_distance
+    assert g.rho > params.influence_distance
     assert v[0] == pytest.approx(0.01 + 2 * params.attraction_gain * 0.001 * DT)
-    tool[3] = -0.05
+    tool = DOWNWARDS._replace(tip=(-0.05, 0.0, -0.1))
     v, _ = go_to_target(params, (0.01, 0.0, 0.0), DT, tool, far, target)
     assert np.linalg.norm(v) == pytest.approx(params.max_speed)
 
@@ -173,7 +171,7 @@ def follow(params, target_velocity=(0.0, 0.0, 0.0), duration=6.0):
         p_s = np.array([0.05, 0.03, -0.12]) + k * DT * np.array(target_velocity)
         target = estimate(p_s, v=target_velocity)
         errors.append(np.linalg.norm(p - p_s))
-        v, _ = go_to_target(params, v, DT, [*g, *p], far, target)
+        v, _ = go_to_target(params, v, DT, RobotTool(tuple(g), tuple(p)), far, target)
         velocities.append(v)
         p = p + DT * np.array(v)
     return np.array(errors), np.array(velocities)
@@ -207,7 +205,7 @@ def test_acceleration_is_bounded_even_where_the_guide_point_jumps():
     rng = np.random.default_rng(5)
     v = (0.0, 0.0, 0.0)
     for _ in range(200):
-        tool = [0, 0, 0, *rng.uniform(-0.05, 0.05, 2), -0.1]
+        tool = DOWNWARDS._replace(tip=(*rng.uniform(-0.05, 0.05, 2), -0.1))
         obstacle = estimate((*rng.uniform(-0.05, 0.05, 2), -0.1), g=(0.01, 0, 0))
         after, _ = go_to_target(
             params, v, DT, tool, obstacle, estimate((0.05, 0.03, -0.12))
@@ -221,22 +219,22 @@ def test_acceleration_is_bounded_even_where_the_guide_point_jumps():
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda tool, o, t: (tool, [*o[:15], 0.0, o[16]], t),
-        lambda tool, o, t: (tool, o, [*t[:15], 0.0, t[16]]),
-        lambda tool, o, t: (tool, [nan] * 17, t),
-        lambda tool, o, t: (tool, o, [*t[:3], nan, *t[4:]]),
-        lambda tool, o, t: ([nan] * 6, o, t),
+        lambda tool, o, t: (tool, o._replace(known=0.0), t),
+        lambda tool, o, t: (tool, o, t._replace(known=0.0)),
+        lambda tool, o, t: (tool, Estimate(*[(nan,) * 3] * 4, *[nan] * 5), t),
+        lambda tool, o, t: (tool, o, t._replace(v=(nan, 0.0, 0.0))),
+        lambda tool, o, t: (RobotTool((nan,) * 3, (nan,) * 3), o, t),
     ],
 )
 def test_slows_down_to_rest_without_usable_inputs(spoil):
     params = GoToTargetParams()
-    inputs = spoil(ROBOT_TOOL_EXAMPLE, OBSTACLE_EXAMPLE, TARGET_EXAMPLE)
+    inputs = spoil(ROBOT, OBSTACLE, TARGET)
     v = (0.05, 0.0, 0.0)
     speeds = []
     for _ in range(60):
         v, g = go_to_target(params, v, DT, *inputs)
         speeds.append(np.linalg.norm(v))
-        assert np.all(np.isfinite(g)) and len(g) == 12
+        assert np.isfinite(flat(g)).all() and len(flat(g)) == 12
     assert speeds[0] > 0.03  # smoothly
     assert np.all(np.diff(speeds) <= 0) and speeds[-1] < 1e-9
 
@@ -245,22 +243,24 @@ def test_block_output_is_the_step_that_its_update_makes():
     dut = GoToTarget()
     context = dut.CreateDefaultContext()
     for port, value in zip(
-        ("robot_tool", "obstacle", "target"),
-        (ROBOT_TOOL_EXAMPLE, OBSTACLE_EXAMPLE, TARGET_EXAMPLE),
+        ("robot_tool", "obstacles", "target"),
+        (ROBOT, OBSTACLE, TARGET),
         strict=True,
     ):
-        dut.GetInputPort(port).FixValue(context, value)
+        dut.GetInputPort(port).FixValue(context, flat(value))
     v_tip, expected_guide = go_to_target(
         GoToTargetParams(),
         (0.0, 0.0, 0.0),
         DT,
-        ROBOT_TOOL_EXAMPLE,
-        OBSTACLE_EXAMPLE,
-        TARGET_EXAMPLE,
+        ROBOT,
+        OBSTACLE,
+        TARGET,
     )
     v1 = dut.GetOutputPort("v1").Eval(context)
-    np.testing.assert_allclose(v1, expected_guide[7] * np.array(v_tip))
-    np.testing.assert_allclose(dut.GetOutputPort("guide").Eval(context), expected_guide)
+    np.testing.assert_allclose(v1, expected_guide.s * np.array(v_tip))
+    np.testing.assert_allclose(
+        dut.GetOutputPort("guide").Eval(context), flat(expected_guide)
+    )
     simulator = Simulator(dut, context)
     simulator.AdvanceTo(0.5 * DT)
     state = context.get_discrete_state_vector().value()
@@ -270,20 +270,24 @@ def test_block_output_is_the_step_that_its_update_makes():
         GoToTargetParams(),
         v_tip,
         0.5 * DT,
-        ROBOT_TOOL_EXAMPLE,
-        OBSTACLE_EXAMPLE,
-        TARGET_EXAMPLE,
+        ROBOT,
+        OBSTACLE,
+        TARGET,
     )
     np.testing.assert_allclose(
-        dut.GetOutputPort("v1").Eval(context), g[7] * np.array(half)
+        dut.GetOutputPort("v1").Eval(context), g.s * np.array(half)
     )
 
 
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"form": "correct"}, "form='correct' must be one of corrected, printed"),
-        ({"attraction_gain": -1.0}, r"attraction_gain=-1.0 must be finite and > 0"),
+        (
+            {"form": "correct"},
+            "form='correct': expected one of .*did you mean 'corrected'",
+        ),
+        ({"attraction_gain": -1.0}, r"go_to_target.attraction_gain=-1.0 1/s\^2: .*> 0"),
+        ({"attraction_gain": 1e9}, r"expected > 0 and <= 10000; the default is 120"),
         ({"repulsion_gain": -1e-4}, "repulsion_gain=-0.0001"),
         ({"max_speed": 0.0}, "max_speed=0.0"),
         ({"max_acceleration": nan}, "max_acceleration=nan"),
@@ -291,7 +295,7 @@ def test_block_output_is_the_step_that_its_update_makes():
         ({"period": -0.1}, "period=-0.1"),
         ({"influence_distance": float("inf")}, "influence_distance=inf"),
         ({"contact_distance": -0.001}, "contact_distance=-0.001"),
-        ({"proportion_floor": 0.0}, r"proportion_floor=0.0 must be in \(0, 1\]"),
+        ({"proportion_floor": 0.0}, "proportion_floor=0.0: expected > 0 and <= 1"),
     ],
 )
 def test_bad_parameters(change, message):

@@ -13,13 +13,18 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import LogVectorOutput
 import pytest
 
+from diagrams.gauze.kinematic_loop import Robot, estimate
+from diagrams.gauze.kinematic_planners import LocalPlanner
+from diagrams.gauze.scenes import CONTACT
 from plants.surgeon.surgeon_tool import SurgeonToolParams, tip_motion
-from systems.auto_guidance.go_to_target import GoToTargetParams
+from systems.auto_guidance.backward_movement import BackwardMovement
+from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
+from systems.auto_guidance.go_to_target import GoToTarget, GoToTargetParams
+from systems.auto_guidance.velocity_corrections import VelocityCorrections
 from systems.common import geometry
 from systems.common.geometry import norm
-from tests.benchmarks.crossed_scenes import CONTACT
-from tests.benchmarks.kinematic_loop import LocalPlanner, Robot, estimate
-from tests.benchmarks.planner_step import add_planner
+from systems.common.signal import flat, size
+from systems.common.signals import Estimate, RobotTool
 from tests.loosely import loosely
 
 closest_points = loosely(geometry.closest_points)
@@ -84,12 +89,12 @@ def simulate(target, obstacle, duration, planner=None):
         a = [(after[i] - before[i]) / (t + 1e-3 - max(t - 1e-3, 0)) for i in (3, 4, 5)]
         v = planner.step(
             DT,
-            [*G_R, *tip],
+            RobotTool(G_R, tip),
             estimate(o[:3], obstacle.p_WG, o[3:], a),
             estimate(s[:3], target.p_WG, s[3:]),
         )
-        rho = closest_points(G_R, tip, obstacle.p_WG, o[:3])[2] - CONTACT
-        v1_tip = np.divide(planner.v1, planner.guide[7])
+        rho = closest_points(G_R, tip, obstacle.p_WG, o[:3]).distance - CONTACT
+        v1_tip = np.divide(planner.v1, planner.guide.s)
         rows.append((t, tip, v, v1_tip, o[3:], rho, dist(tip, s[:3]), planner.weights))
         for _ in range(4):
             tip = robot.moved(G_R, tip, v, DT / 4)
@@ -118,7 +123,7 @@ def test_static_surgeon():
 def test_straight_way_of_the_static_scenario_would_touch():
     t = np.linspace(0.0, 1.0, 200)[:, None]
     tips = (1 - t) * START + t * np.array(TARGET.points[0])
-    gaps = [closest_points(G_R, p, G_O, STANDING.points[0])[2] for p in tips]
+    gaps = [closest_points(G_R, p, G_O, STANDING.points[0]).distance for p in tips]
     assert min(gaps) < CONTACT
 
 
@@ -161,11 +166,25 @@ def test_push():
 class Replay(LeafSystem):
     """Emits a signal as a function of time."""
 
-    def __init__(self, size, signal):
+    def __init__(self, signal, value):
         super().__init__()
         self.DeclareVectorOutputPort(
-            "y", size, lambda c, y: y.SetFromVector(signal(c.get_time()))
+            "y", size(signal), lambda c, y: y.SetFromVector(flat(value(c.get_time())))
         )
+
+
+def add_planner(builder, ports):
+    """Adds the four blocks and connects them by name; all output ports by name."""
+    kinds = (GoToTarget, VelocityCorrections, BackwardMovement, FuzzyArbiter)
+    blocks = [builder.AddNamedSystem(kind.__name__, kind()) for kind in kinds]
+    for block in blocks:
+        outputs = map(block.get_output_port, range(block.num_output_ports()))
+        ports |= {port.get_name(): port for port in outputs}
+    for block in blocks:
+        for i in range(block.num_input_ports()):
+            port = block.get_input_port(i)
+            builder.Connect(ports[port.get_name()], port)
+    return ports
 
 
 @pytest.mark.parametrize("kind", ["CROSSING", "PUSHING"])
@@ -179,7 +198,7 @@ def test_the_drake_blocks_give_the_loops_velocities(kind):
         s, o = s_at(t), o_at(t)
         inputs.append(
             (
-                [*G_R, *tip],
+                RobotTool(G_R, tuple(tip)),
                 estimate(o[:3], obstacle.p_WG, o[3:]),
                 estimate(s[:3], DRIFTING.p_WG, s[3:]),
             )
@@ -188,14 +207,14 @@ def test_the_drake_blocks_give_the_loops_velocities(kind):
         expected.append(
             [*planner.v1, *planner.v2, *planner.v3, *planner.weights, *planner.v_R]
         )
-    builder = DiagramBuilder()
+    builder, last = DiagramBuilder(), len(inputs) - 1
     ports = {
         name: builder.AddNamedSystem(
             name,
-            Replay(size, lambda t, i=i: inputs[min(round(t / DT), len(inputs) - 1)][i]),
+            Replay(signal, lambda t, i=i: inputs[min(round(t / DT), last)][i]),
         ).get_output_port()
-        for i, (name, size) in enumerate(
-            (("robot_tool", 6), ("obstacle", 17), ("target", 17))
+        for i, (name, signal) in enumerate(
+            (("robot_tool", RobotTool), ("obstacles", Estimate), ("target", Estimate))
         )
     }
     ports = add_planner(builder, ports)

@@ -16,7 +16,8 @@ from systems.auto_guidance.velocity_corrections import (
     VelocityCorrectionsParams,
 )
 from systems.common import geometry
-from systems.common.signals import OBSTACLE_EXAMPLE
+from systems.common.signal import example, flat
+from systems.common.signals import Estimate, Guide
 from tests.loosely import loosely
 
 closest_on_segment = loosely(geometry.closest_on_segment)
@@ -39,11 +40,11 @@ HEAD, *ROWS = [line.split() for line in PAPER.strip().splitlines()]
 
 
 def obstacle(p, v, g=(0.0, 0.1, 0.0), a=(0.0, 0.0, 0.0)):
-    return [*p, *v, *a, *g, 3e-4, 3e-3, 0.05, 1.0, 0.0]
+    return example(Estimate)._replace(p=tuple(p), v=tuple(v), a=a, fulcrum=g)
 
 
 def guide(m_r, goal):
-    return [*m_r, 0.0, 0.0, -0.05, 0.05, 1.0, 0.9, *goal]
+    return Guide(tuple(m_r), (0.0, 0.0, -0.05), 0.05, 1.0, 0.9, tuple(goal))
 
 
 def test_labels_are_the_papers():
@@ -111,9 +112,10 @@ def test_crossing_against_brute_force():
         # The tip goes straight from here to its predicted place.
         end = np.array(predicted_tip(o, PARAMS.horizon, PARAMS.acceleration_time))
         times = np.linspace(0.0, PARAMS.horizon, 201)
-        tips = [o[0:3] + t / PARAMS.horizon * (end - o[0:3]) for t in times]
+        start = np.array(o.p)
+        tips = [start + t / PARAMS.horizon * (end - start) for t in times]
 
-        def nearest(d, m_r=m_r, e=e, g=o[9:12], tips=tips):
+        def nearest(d, m_r=m_r, e=e, g=o.fulcrum, tips=tips):
             gaps = [closest_on_segment(m_r + d * e, g, tip)[1] for tip in tips]
             return min(gaps), int(np.argmin(gaps))
 
@@ -169,17 +171,16 @@ def test_acceleration_dies_out_in_the_prediction():
     assert late == pytest.approx(0.02 + 0.1 * 0.2, rel=1e-3)
 
 
+AHEAD, OBSTACLE = guide((0, 0, -0.1), (0.1, 0, -0.1)), example(Estimate)
+
+
 @pytest.mark.parametrize(
     "v1, g, o",
     [
-        ((nan, 0, 0), guide((0, 0, -0.1), (0.1, 0, -0.1)), OBSTACLE_EXAMPLE),
-        ((0.05, 0, 0), [nan] * 12, OBSTACLE_EXAMPLE),
-        ((0.05, 0, 0), guide((0, 0, -0.1), (0.1, 0, -0.1)), [nan] * 17),
-        (
-            (0.05, 0, 0),
-            guide((0, 0, -0.1), (0.1, 0, -0.1)),
-            [*OBSTACLE_EXAMPLE[:15], 0.0, 1.0],
-        ),
+        ((nan, 0, 0), AHEAD, OBSTACLE),
+        ((0.05, 0, 0), AHEAD._replace(M_Rf=(nan, 0, 0)), OBSTACLE),
+        ((0.05, 0, 0), AHEAD, Estimate(*[(nan,) * 3] * 4, *[nan] * 5)),
+        ((0.05, 0, 0), AHEAD, OBSTACLE._replace(known=0.0, age=1.0)),
     ],
 )
 def test_nothing_known_nothing_corrected(v1, g, o):
@@ -191,7 +192,11 @@ def test_block():
     context = dut.CreateDefaultContext()
     g = guide((-0.05, 0.0, -0.1), (0.05, 0.0, -0.1))
     o = obstacle((0.01, -0.03, -0.12), (-0.05, 0.0, 0.01))
-    for name, value in (("v1", (0.05, 0, 0)), ("guide", g), ("obstacle", o)):
+    for name, value in (
+        ("v1", (0.05, 0, 0)),
+        ("guide", flat(g)),
+        ("obstacles", flat(o)),
+    ):
         dut.GetInputPort(name).FixValue(context, value)
     expected = velocity_correction(PARAMS, (0.05, 0, 0), g, o)
     np.testing.assert_allclose(dut.GetOutputPort("v2").Eval(context), expected)
@@ -201,12 +206,16 @@ def test_block():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"distances": [0.0, 0.1]}, "5 values >= 0, for Z, AZ, M, F, VF"),
-        ({"times": [0, 1, 1, 2, 3]}, "must increase"),
-        ({"times": [-1, 0, 1, 2, 3]}, "5 values >= 0"),
-        ({"distances": [0.0, nan, 0.1, 0.2, 0.3]}, "must increase"),
-        ({"scales": [0.1, 0.2, 0.3, 0.4, 0.5, 1.0]}, "must start at 0 and end at 1"),
-        ({"horizon": 0.0}, "horizon=0.0 must be finite and > 0"),
+        (
+            {"distances": [0.0, 0.1]},
+            r"distances=\[0.0, 0.1\] m: expected 5 numbers >= 0",
+        ),
+        ({"times": [0, 1, 1, 2, 3]}, "times=.* s: expected increasing numbers"),
+        ({"times": [-1, 0, 1, 2, 3]}, "times=.*5 numbers >= 0"),
+        ({"distances": [0.0, nan, 0.1, 0.2, 0.3]}, "distances=.*5 numbers"),
+        ({"scales": [0.1, 0.2, 0.3, 0.4, 0.5, 1.0]}, "scales=.*0 at the start and 1"),
+        ({"horizon": 0.0}, "horizon=0.0 s: expected > 0"),
+        ({"near_distance": 5.0}, "near_distance=5.0 m: expected > 0 and <= 0.1"),
         ({"moving_speed": -1.0}, "moving_speed=-1.0"),
     ],
 )

@@ -6,16 +6,18 @@ from math import hypot
 import numpy as np
 import pytest
 
-from systems.bypass.shadow_body import COLUMNS, FULCRUM, TIP, way_distance
+from diagrams.gauze.kinematic_planners import NO_CONE
+from diagrams.gauze.scenes import scene
+from systems.bypass.shadow_body import ObstacleTool, pose_distance, way_distance
 from systems.bypass.tip_edge import tip_edge
 from systems.bypass.top_edge import nearest_room, top_edge
 from systems.bypass.workspace import WorkspaceParams, constants
 from systems.common import geometry
-from tests.benchmarks.bypass_planners import NO_CONE
-from tests.benchmarks.crossed_scenes import scene
+from systems.common.reach_limits import ReachLimits
 
 ROOM = constants(
-    WorkspaceParams(min_insertion=0.015, max_insertion=0.5, max_tilt=3.1, floor=-1.0)
+    ReachLimits(min_insertion=0.015, max_insertion=0.5, max_tilt=3.1),
+    WorkspaceParams(floor=-0.5),
 )[0]
 D = 0.0095
 EDGES = {"top": top_edge, "tip": tip_edge}
@@ -43,7 +45,7 @@ def test_gradients_have_length_one_and_point_along_the_way(name):
         assert np.linalg.norm(direction) == pytest.approx(1.0, abs=1e-9)
         p = np.array(given.p_WPr)
         gradient = [
-            (at(p + step * e)[1] - at(p - step * e)[1]) / (2.0 * step)
+            (at(p + step * e).length - at(p - step * e).length) / (2.0 * step)
             for e in np.eye(3)
         ]
         if np.abs(gradient).max() > 2.0:  # a border of the edge lies between
@@ -58,28 +60,27 @@ def test_following_an_edge_leads_to_the_goal_in_its_length():
     for number in range(40):
         given = scene("standing", 3, number)
         a, p_o = given.p_WGo, given.legs[0].p0
-        row = np.zeros(COLUMNS)
-        row[TIP : TIP + 3], row[FULCRUM : FULCRUM + 3] = p_o, a
+        tool = ObstacleTool(p_o, (0.0, 0.0, 0.0), a, D, D)
         goal = given.p_WPs
-        rho = geometry.closest_points(given.p_WGr, goal, a, p_o)[2]
+        rho = geometry.closest_points(given.p_WGr, goal, a, p_o).distance
         keep = min(D, rho - 1e-4)
         ways = [
             edge(given.p_WGr, given.p_WPr, goal, a, p_o, keep, ROOM, NO_CONE)
             for edge in EDGES.values()
         ]
-        best = min(range(2), key=lambda k: ways[k][1])
-        edge, total = list(EDGES.values())[best], ways[best][1]
+        best = min(range(2), key=lambda k: ways[k].length)
+        edge, total = list(EDGES.values())[best], ways[best].length
         p, gone, step = given.p_WPr, 0.0, 2e-4
         low = 1.0
         while geometry.norm(geometry.sub(goal, p)) > 1e-3 and gone < 1.1 * total:
             direction = geometry.unit(geometry.sub(goal, p))
-            if way_distance(row, given.p_WGr, p, goal) < keep:
+            if way_distance(tool, given.p_WGr, p, goal) < keep:
                 route = edge(given.p_WGr, p, goal, a, p_o, keep, ROOM, NO_CONE)
-                assert route[0]
-                direction = route[2]
+                assert route.is_there
+                direction = route.direction
             p = geometry.along(p, step, direction)
             gone += step
-            low = min(low, geometry.closest_points(given.p_WGr, p, a, p_o)[2])
+            low = min(low, geometry.closest_points(given.p_WGr, p, a, p_o).distance)
         assert gone == pytest.approx(total, abs=3e-3)
         assert low > min(keep, 0.0075) - 2e-3
 
@@ -92,12 +93,11 @@ def test_the_ways_are_the_shortest_that_a_search_finds():
         given = scene("standing", 4, number)
         g, p, goal = given.p_WGr, given.p_WPr, given.p_WPs
         a, p_o = given.p_WGo, given.legs[0].p0
-        row = np.zeros(COLUMNS)
-        row[TIP : TIP + 3], row[FULCRUM : FULCRUM + 3] = p_o, a
-        if min(geometry.closest_points(g, x, a, p_o)[2] for x in (p, goal)) < D + 1e-3:
+        tool = ObstacleTool(p_o, (0.0, 0.0, 0.0), a, D, D)
+        if min(pose_distance(tool, g, x) for x in (p, goal)) < D + 1e-3:
             continue
         ours = min(
-            edge(g, p, goal, a, p_o, D, ROOM, NO_CONE)[1] for edge in EDGES.values()
+            edge(g, p, goal, a, p_o, D, ROOM, NO_CONE).length for edge in EDGES.values()
         )
         best, spread = None, 0.05
         for _ in range(6000):
@@ -114,7 +114,7 @@ def test_the_ways_are_the_shortest_that_a_search_finds():
                 continue
             inserted = all(geometry.norm(geometry.sub(x, g)) > 0.015 for x in via)
             if inserted and all(
-                way_distance(row, g, x, y) >= D for x, y in itertools.pairwise(path)
+                way_distance(tool, g, x, y) >= D for x, y in itertools.pairwise(path)
             ):
                 best = (length, via)
         if best is not None:
@@ -137,9 +137,11 @@ def test_the_tip_edge_keeps_to_the_floor():
     g, p, goal = (0.0, 0.0, 0.0), (-0.04, 0.0, -0.1), (0.04, 0.0, -0.1)
     a, p_o = (0.0, 0.1, 0.0), (0.0, 0.01, -0.09)
     free = tip_edge(g, p, goal, a, p_o, D, ROOM, NO_CONE)
-    assert free[0] and free[1] > hypot(0.08, 0.0)
-    low = constants(WorkspaceParams(floor=-0.08, max_tilt=3.1))[0]
+    assert free.is_there and free.length > hypot(0.08, 0.0)
+    reach = ReachLimits(max_tilt=3.1)
+    low = constants(reach, WorkspaceParams(floor=-0.08))[0]
     held = tip_edge(g, p, goal, a, p_o, D, low, NO_CONE)
-    assert held[0] and held[1] > free[1] and held[3][2] >= -0.08 - 1e-9
-    none = constants(WorkspaceParams(floor=-0.02, max_tilt=3.1))[0]
-    assert not tip_edge(g, p, goal, a, p_o, D, none, NO_CONE)[0]
+    assert held.is_there and held.length > free.length
+    assert held.edge[2] >= -0.08 - 1e-9
+    none = constants(reach, WorkspaceParams(floor=-0.02))[0]
+    assert not tip_edge(g, p, goal, a, p_o, D, none, NO_CONE).is_there

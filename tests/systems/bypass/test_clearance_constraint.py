@@ -3,40 +3,37 @@
 import numpy as np
 import pytest
 
+from diagrams.gauze.kinematic_loop import estimate
+from diagrams.gauze.kinematic_planners import NO_CONE
 from systems.bypass import clearance_constraint, obstacle_tools, workspace
 from systems.bypass.clearance_constraint import (
-    TOOLS,
     ClearanceConstraint,
     ClearanceConstraintParams,
     constrain,
     distance_rate,
 )
 from systems.bypass.obstacle_tools import Margins
-from systems.bypass.shadow_body import (
-    COLUMNS,
-    FULCRUM,
-    PLAN,
-    SAFE,
-    TIP,
-    VELOCITY,
-)
+from systems.bypass.shadow_body import ObstacleTool, pose_distance, read_tool
 from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
-from tests.benchmarks.bypass_planners import NO_CONE
-from tests.benchmarks.kinematic_loop import estimate
+from systems.common.reach_limits import ReachLimits
+from systems.common.signal import example, flat
+from systems.common.signals import FREE, Estimate, Guide, RobotTool
 
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
-ROOM = workspace.constants(WorkspaceParams(max_tilt=3.1, floor=-1.0))[0]
-NOT_DODGING = np.zeros(TOOLS)
+ROOM = workspace.constants(ReachLimits(max_tilt=3.1), WorkspaceParams(floor=-0.5))[0]
+NOT_DODGING = np.zeros(3)
 
 
-def tool(a, tip, v=(0.0, 0.0, 0.0), safe=0.007) -> np.ndarray:
-    """A row of obstacle tools."""
-    row = np.zeros(COLUMNS)
-    row[TIP : TIP + 3], row[FULCRUM : FULCRUM + 3] = tip, a
-    row[VELOCITY : VELOCITY + 3], row[SAFE], row[PLAN] = v, safe, safe + 0.0025
-    return row
+def tool(a, tip, v=(0.0, 0.0, 0.0)) -> ObstacleTool:
+    """An obstacle tool."""
+    return ObstacleTool(tip, v, a, 0.007, 0.0095)
+
+
+def rows(*tools):
+    """Obstacle tools as the constraint takes them."""
+    return np.array([flat(one) for one in tools])
 
 
 def moved(p, v, dt):
@@ -50,18 +47,19 @@ def test_the_rate_agrees_with_finite_differences():
     for _ in range(2000):
         a, tip, p = (tuple(rng.uniform(-0.1, 0.1, 3)) for _ in range(3))
         v_o, v = (tuple(rng.uniform(-0.1, 0.1, 3)) for _ in range(2))
-        rho, s, row, closing, _ = distance_rate(G, p, tool(a, tip, v_o))
-        fraction = geometry.closest_points(G, p, a, tip)[1]
-        if rho < 1e-3 or s < 1e-6 or fraction < 1e-6:  # a fulcrum is no material point
+        now = distance_rate(G, p, tool(a, tip, v_o))
+        fraction = geometry.closest_points(G, p, a, tip).t
+        # A fulcrum is no material point.
+        if now.rho < 1e-3 or now.s < 1e-6 or fraction < 1e-6:
             continue
         before, after = (
-            geometry.closest_points(G, moved(p, v, k * dt), a, moved(tip, v_o, k * dt))[
-                2
-            ]
+            geometry.closest_points(
+                G, moved(p, v, k * dt), a, moved(tip, v_o, k * dt)
+            ).distance
             for k in (-1, 1)
         )
         rate = (after - before) / (2.0 * dt)
-        assert geometry.dot(row, v) - closing == pytest.approx(rate, abs=1e-5)
+        assert geometry.dot(now.A, v) - now.c == pytest.approx(rate, abs=1e-5)
         compared += 1
     assert compared > 800
 
@@ -70,10 +68,10 @@ def test_what_is_safe_passes_unchanged():
     far = tool((0.1, 0.1, 0.0), (0.08, 0.1, -0.1))
     wanted = (0.03, 0.01, -0.02)
     v, _, status = constrain(
-        RECORD, ROOM, NO_CONE, G, (0.0, 0.0, -0.1), wanted, far[None], NOT_DODGING
+        RECORD, ROOM, NO_CONE, G, (0.0, 0.0, -0.1), wanted, rows(far), NOT_DODGING
     )
     assert v == pytest.approx(wanted, abs=1e-12)
-    assert status[1] == 0.0 and status[2] == 1.0 and status[4] < 1e-9
+    assert status.near == 0.0 and status.condition == 1.0 and status.change < 1e-9
 
 
 def test_the_distance_is_held_against_a_tool_that_evasion_can_match():
@@ -82,13 +80,13 @@ def test_the_distance_is_held_against_a_tool_that_evasion_can_match():
     a, v_o = (0.03, 0.09, 0.0), (-0.03, 0.0, 0.0)
     low, dodging, held = 1.0, NOT_DODGING, True
     for _ in range(600):
-        row = tool(a, tip, v_o)
+        row = rows(tool(a, tip, v_o))
         v, dodging, status = constrain(
-            RECORD, ROOM, NO_CONE, G, p, (0.02, 0.0, 0.0), row[None], dodging
+            RECORD, ROOM, NO_CONE, G, p, (0.02, 0.0, 0.0), row, dodging
         )
-        held = held and status[2] > 0.5
+        held = held and status.condition > 0.5
         p, tip = moved(p, v, dt), moved(tip, v_o, dt)
-        low = min(low, geometry.closest_points(G, p, a, tip)[2])
+        low = min(low, geometry.closest_points(G, p, a, tip).distance)
     assert held
     assert low > 0.007 - 5e-5
     assert p[0] < -0.01  # it was carried along
@@ -96,18 +94,19 @@ def test_the_distance_is_held_against_a_tool_that_evasion_can_match():
 
 def test_a_sweep_that_is_too_fast_is_told_and_dodged():
     p, a, tip = (0.0, 0.0, -0.12), (0.02, 0.09, 0.0), (0.013, -0.05, -0.08)
-    row = tool(a, tip, (-0.2, 0.0, 0.0))
+    row = rows(tool(a, tip, (-0.2, 0.0, 0.0)))
     v, dodging, status = constrain(
-        RECORD, ROOM, NO_CONE, G, p, (0.0, 0.0, 0.0), row[None], NOT_DODGING
+        RECORD, ROOM, NO_CONE, G, p, (0.0, 0.0, 0.0), row, NOT_DODGING
     )
-    assert status[1] == 1.0 and status[2] == 0.0  # near, and the condition fails
-    assert dodging[0] == 1.0
+    assert status.near == 1.0 and status.condition == 0.0
+    assert dodging[0] == 1.0 == status.dodge
     assert v[0] < 0.0 and v[2] > 0.0  # away from O, and out of its way
 
 
 def test_the_borders_of_the_workspace_hold():
-    away = tool((0.3, 0.3, 0.0), (0.3, 0.3, -0.05))[None]
-    room = workspace.constants(WorkspaceParams(floor=-0.1, max_tilt=0.5))[0]
+    away = rows(tool((0.3, 0.3, 0.0), (0.3, 0.3, -0.05)))
+    reach = ReachLimits(max_tilt=0.5)
+    room = workspace.constants(reach, WorkspaceParams(floor=-0.1))[0]
     for p, wanted, axis in (
         ((0.0, 0.0, -0.0999), (0.0, 0.0, -0.1), (0.0, 0.0, -1.0)),
         ((0.0, 0.0, -0.0301), (0.0, 0.0, 0.1), (0.0, 0.0, 1.0)),
@@ -123,34 +122,99 @@ def test_the_borders_of_the_workspace_hold():
     assert angle < 0.5005
 
 
+def test_it_keeps_clear_of_three_obstacles():
+    """R is sent at one after the other, and then between two of them."""
+    obstacles = [
+        estimate((0.02, 0.02, -0.13), (0.09, 0.09, 0.0)),
+        estimate((-0.02, 0.02, -0.13), (-0.09, 0.09, 0.0)),
+        estimate((0.0, -0.025, -0.13), (0.0, -0.12, 0.0)),
+    ]
+    far = estimate((0.3, 0.0, -0.1), (0.3, 0.0, 0.0))
+    dut = ClearanceConstraint(obstacles=("right", "left", "front"))
+    context = dut.CreateDefaultContext()
+    for name, signal in {
+        "guide": example(Guide)._replace(s=1.0),
+        "obstacles": tuple(obstacles),
+        "target": far,
+        "camera": far,
+        "view_cone": NO_CONE,
+        "permission": FREE,
+    }.items():
+        dut.GetInputPort(name).FixValue(context, flat(signal))
+    p, near = (0.0, 0.0, -0.12), np.full(3, np.inf)
+    for goal in [*(tool.p for tool in obstacles), (0.0, 0.05, -0.12)]:
+        for _ in range(120):
+            wanted = geometry.scaled(2.0, geometry.sub(goal, p))
+            robot = RobotTool(G, p)
+            dut.GetInputPort("robot_tool").FixValue(context, flat(robot))
+            dut.GetInputPort("v_R").FixValue(context, wanted)
+            v = dut.GetOutputPort("v_safe").Eval(context)
+            p = moved(p, tuple(v), 1.0 / 60.0)
+            near = np.minimum(
+                near,
+                [
+                    geometry.closest_points(G, p, o.fulcrum, o.p).distance
+                    for o in obstacles
+                ],
+            )
+    # It was near to each, and never nearer than D_safe.
+    assert (near < 0.0075).all() and (near > 0.007 - 1e-4).all()
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_one_of_three_that_is_lost_cannot_be_judged(place):
+    dut = ClearanceConstraint(obstacles=("right", "left", "front"))
+    context = dut.CreateDefaultContext()
+    for index in range(dut.num_input_ports()):
+        port = dut.get_input_port(index)
+        port.FixValue(context, dut.AllocateInputVector(port).value())
+    assert dut.GetOutputPort("status").Eval(context)[2] == 1.0
+    for bad in ({"known": 0.0}, {"p": (np.nan, 0.0, 0.0)}):
+        obstacles = [example(Estimate)] * 3
+        obstacles[place] = obstacles[place]._replace(**bad)
+        dut.GetInputPort("obstacles").FixValue(context, flat(tuple(obstacles)))
+        v_R = dut.GetInputPort("v_R").Eval(context)
+        np.testing.assert_array_equal(dut.GetOutputPort("v_safe").Eval(context), v_R)
+        assert not np.any(dut.GetOutputPort("status").Eval(context))
+
+
 def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
     record = obstacle_tools.constants(Margins())[0]
     o = estimate((0.0, 0.05, -0.1), (0.0, 0.1, 0.0))
     s = estimate((0.05, 0.0, -0.1), (0.1, 0.0, 0.0))
     c = estimate((0.0, -0.05, -0.05), (0.0, -0.1, 0.0))
-    sure = obstacle_tools.obstacle_tools(record, G, o, s, c)
-    assert sure.shape == (3, COLUMNS)
-    assert sure[0, SAFE] == Margins().safe_distance
-    assert sure[2, SAFE] == Margins().camera_distance
-    o[12], o[13] = 3e-4, 0.01
-    unsure = obstacle_tools.obstacle_tools(record, G, o, s, c)
+
+    def around(*obstacles):
+        estimates = np.array([*map(flat, obstacles)])
+        tools = obstacle_tools.obstacle_tools(record, G, estimates, s, c)
+        return [*map(read_tool, tools)]
+
+    sure = around(o)
+    assert len(sure) == 3
+    assert sure[0].safe == Margins().safe_distance
+    assert sure[2].safe == Margins().camera_distance
+    o = o._replace(sigma_p=3e-4, sigma_v=0.01)
+    unsure = around(o)
     extra = 3.0 * np.hypot(3e-4, 0.03 * 0.01)
-    assert unsure[0, SAFE] - sure[0, SAFE] == pytest.approx(extra)
+    assert unsure[0].safe - sure[0].safe == pytest.approx(extra)
+    # Every obstacle has a row of its own, before S and the endoscope.
+    three = around(o, s, c)
+    assert [tool.tip for tool in three[:3]] == [o.p, s.p, c.p]
+    assert three[3:] == sure[1:]
     # The final pose keeps the distance that is planned with from what is left of S.
-    end = tuple(sure[1, TIP : TIP + 3])
-    rho = geometry.closest_points(G, (0.05, 0.0, -0.1), (0.1, 0.0, 0.0), end)[2]
+    rho = pose_distance(sure[1], G, (0.05, 0.0, -0.1))
     assert rho == pytest.approx(Margins().plan_distance + 1e-3, abs=1e-4)
 
 
 def test_bad_parameters_are_named():
-    with pytest.raises(ValueError, match=r"rate=-1.0 must be finite and >= 0"):
+    with pytest.raises(ValueError, match=r"rate=-1.0 1/s: expected >= 0.1 and <= 60"):
         ClearanceConstraint(ClearanceConstraintParams(rate=-1.0))
-    with pytest.raises(ValueError, match=r"rate=60.0 /s is too fast"):
+    with pytest.raises(ValueError, match=r"rate=60.0 1/s: expected at most .* = 30"):
         ClearanceConstraint(ClearanceConstraintParams(rate=60.0))
-    with pytest.raises(ValueError, match=r"plan_distance=0.005 m must be over"):
+    with pytest.raises(ValueError, match=r"plan_distance=0.005 m: expected more than"):
         ClearanceConstraint(margins=Margins(plan_distance=0.005))
-    with pytest.raises(ValueError, match=r"max_tilt=40.0 rad .* is it in degrees"):
-        ClearanceConstraint(workspace=WorkspaceParams(max_tilt=40.0))
+    with pytest.raises(ValueError, match=r"reach_limits.max_tilt=40.0 rad: expected"):
+        ClearanceConstraint(reach=ReachLimits(max_tilt=40.0))
 
 
 def test_the_block_lets_pass_what_it_cannot_judge():
@@ -159,9 +223,8 @@ def test_the_block_lets_pass_what_it_cannot_judge():
     for index in range(dut.num_input_ports()):
         port = dut.get_input_port(index)
         port.FixValue(context, dut.AllocateInputVector(port).value())
-    lost = np.array(dut.GetInputPort("obstacle").Eval(context))
-    lost[15] = 0.0
-    dut.GetInputPort("obstacle").FixValue(context, lost)
+    lost = example(Estimate)._replace(known=0.0)
+    dut.GetInputPort("obstacles").FixValue(context, flat(lost))
     wanted = [0.01, 0.02, 0.03]
     dut.GetInputPort("v_R").FixValue(context, wanted)
     np.testing.assert_allclose(dut.GetOutputPort("v_safe").Eval(context), wanted)

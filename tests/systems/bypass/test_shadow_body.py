@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from systems.bypass.shadow_body import (
-    COLUMNS,
     FAR,
-    FULCRUM,
-    TIP,
+    ObstacleTool,
     free_depth,
     pose_distance,
+    read_tool,
     way_distance,
+    write_tool,
 )
-from systems.common import geometry
+from systems.common import geometry, signal
+from systems.common.signal import flat, size
 
 G = (0.0, 0.0, 0.0)
 D = 0.0095
@@ -28,14 +29,12 @@ def points(low: float = -0.1, high: float = 0.1):
 
 def distance(p, a, tip) -> float:
     """Distance of R's shaft with its tip at p from a tool."""
-    return geometry.closest_points(G, p, a, tip)[2]
+    return geometry.closest_points(G, p, a, tip).distance
 
 
-def tool(a, tip) -> np.ndarray:
-    """A tool at rest as a row."""
-    row = np.zeros(COLUMNS)
-    row[TIP : TIP + 3], row[FULCRUM : FULCRUM + 3] = tip, a
-    return row
+def tool(a, tip) -> ObstacleTool:
+    """A tool at rest."""
+    return ObstacleTool(tip, (0.0, 0.0, 0.0), a, D, D)
 
 
 def behind(a, tip, share, off, stretch):
@@ -73,7 +72,7 @@ def test_free_depth_is_where_the_distance_falls_to_D(a, tip, p):
     assume(geometry.norm(p) > 0.01 and distance(G, a, tip) > D + 1e-4)
     assume(geometry.norm(geometry.sub(tip, a)) > 1e-3)
     u = geometry.unit(p)
-    depth = free_depth(G, u, a, tip, D)
+    depth = free_depth(G, u, tool(a, tip), D)
     if depth < FAR:
         assert distance(geometry.along(G, depth, u), a, tip) == pytest.approx(
             D, abs=1e-8
@@ -107,8 +106,16 @@ def test_the_triangle_test_agrees_with_brute_force(a, tip, p, goal):
     assert least <= exact + grid + 1e-9
 
 
+def test_a_tool_is_a_row_of_an_array():
+    rows = np.zeros((2, size(ObstacleTool)))
+    one = signal.example(ObstacleTool)
+    write_tool(rows, 1, one)
+    assert read_tool(rows[1]) == one and rows[1].tolist() == flat(one).tolist()
+    assert not rows[0].any()
+
+
 def test_a_ray_away_from_the_tool_is_free():
     a, tip = (0.05, 0.05, 0.0), (0.0, 0.02, -0.06)
-    assert free_depth(G, (0.0, -0.6, -0.8), a, tip, D) == FAR
-    depth = free_depth(G, geometry.unit((0.0, 0.02, -0.06)), a, tip, D)
+    assert free_depth(G, (0.0, -0.6, -0.8), tool(a, tip), D) == FAR
+    depth = free_depth(G, geometry.unit((0.0, 0.02, -0.06)), tool(a, tip), D)
     assert 0.04 < depth < 0.065

@@ -12,24 +12,26 @@ from systems.bypass.workspace import (
     line_inside,
 )
 from systems.common import geometry
+from systems.common.reach_limits import ReachLimits
+from systems.common.signals import ViewCone
 
 G = (0.0, 0.0, 0.0)
-CONE = np.array([0.05, 0.05, 0.0, -0.408248, -0.408248, -0.816497, 0.6])
-PARAMS = WorkspaceParams(floor=-0.15)
-RECORD = constants(PARAMS)[0]
+CONE = ViewCone((0.05, 0.05, 0.0), (-0.408248, -0.408248, -0.816497), 0.6)
+REACH, FLOOR = ReachLimits(), -0.15
+RECORD = constants(REACH, WorkspaceParams(floor=FLOOR))[0]
 
 
 def allowed(p) -> bool:
     """The limits, written out."""
     q = np.linalg.norm(p)
     tilt = np.arccos(-p[2] / q)
-    ray = np.array(p) - CONE[:3]
-    angle = np.arccos(ray @ CONE[3:6] / np.linalg.norm(ray))
+    ray = np.subtract(p, CONE.apex)
+    angle = np.arccos(ray @ CONE.u / np.linalg.norm(ray))
     return (
-        PARAMS.min_insertion <= q <= PARAMS.max_insertion
-        and tilt <= PARAMS.max_tilt
-        and angle <= CONE[6] - PARAMS.cone_margin
-        and p[2] >= PARAMS.floor
+        REACH.min_insertion <= q <= REACH.max_insertion
+        and tilt <= REACH.max_tilt
+        and angle <= CONE.half - REACH.cone_margin
+        and p[2] >= FLOOR
     )
 
 
@@ -53,16 +55,16 @@ def test_the_part_of_a_line_inside_is_an_interval():
         low, high = line_inside(RECORD, CONE, G, x, d, -0.2, 0.2)
         for t in rng.uniform(-0.2, 0.2, 30):
             p = geometry.along(x, t, d)
-            if geometry.norm(p) < PARAMS.min_insertion:
+            if geometry.norm(p) < REACH.min_insertion:
                 continue  # not looked at here
             assert (low <= t <= high) == allowed(p)
 
 
 def test_a_line_through_the_apex():
-    axis = (0.0, 0.0, -1.0)
+    cone = ViewCone(G, (0.0, 0.0, -1.0), 0.7)
     for _ in range(3):
         u = geometry.unit((0.1, 0.2, -0.9))
         x = geometry.along(G, 0.1, u)
-        low, high = line_in_cone(x, u, G, axis, 0.7)
+        low, high = line_in_cone(x, u, cone)
         assert low == pytest.approx(-0.1, abs=1e-6) and high > 1.0
-    assert line_in_cone((0.3, 0.0, 0.0), (1.0, 0.0, 0.0), G, axis, 0.7)[0] > 0.0
+    assert line_in_cone((0.3, 0.0, 0.0), (1.0, 0.0, 0.0), cone)[0] > 0.0

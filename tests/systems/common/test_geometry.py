@@ -73,7 +73,7 @@ def test_closest_points_of_skew_segments():
 )
 def test_parallel_segments_choose_the_pair_nearest_the_first_ones_end(b0, b1, s, t):
     got = closest_points((0, 0, 0), (4, 0, 0), b0, b1)
-    assert got[:2] == (s, t)
+    assert (got.s, got.t) == (s, t)
 
 
 def test_segments_of_zero_length_are_points():
@@ -82,7 +82,7 @@ def test_segments_of_zero_length_are_points():
     assert rho == 2.0 and t == 0.25
     s, t, rho, _, _ = closest_points((0, 0, 0), (4, 0, 0), point, point)
     assert rho == 2.0 and s == 0.25
-    assert closest_points(point, point, point, point)[2] == 0.0
+    assert closest_points(point, point, point, point).distance == 0.0
 
 
 def test_nearly_parallel_segments():
@@ -98,7 +98,7 @@ def test_segment_triangle_distance_against_sampling(corners):
     distance = segment_triangle_distance(p0, p1, a, b, c)
     # The triangle as a fan of 121 segments from a to points of bc.
     ends = np.array(b) + np.linspace(0, 1, 121)[:, None] * np.subtract(c, b)
-    sampled = min(closest_points(p0, p1, a, tuple(e))[2] for e in ends)
+    sampled = min(closest_points(p0, p1, a, tuple(e)).distance for e in ends)
     spacing = norm(np.subtract(c, b)) / 120
     assert distance - 1e-8 <= sampled <= distance + spacing + 1e-8
 
@@ -133,6 +133,26 @@ def test_shaft_point_velocity_is_that_of_a_rigid_shaft_through_its_fulcrum():
     depth = 0.3 * length
     expected = (u1 * (depth + slide) - u0 * depth) / h
     np.testing.assert_allclose(shaft_point_velocity(0.3, u0, v), expected, atol=1e-5)
+
+
+def test_vector_functions_against_numpy():
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        a, b = map(tuple, rng.normal(size=(2, 3)))
+        t, u = float(rng.normal()), geometry.unit(tuple(rng.normal(size=3)))
+        for ours, numpys in (
+            (geometry.plus(a, b), np.add(a, b)),
+            (geometry.sub(a, b), np.subtract(a, b)),
+            (geometry.scaled(t, a), t * np.array(a)),
+            (geometry.over(a, t), np.array(a) / t),
+            (geometry.along(a, t, b), a + t * np.array(b)),
+            (geometry.across(a, u), a - np.dot(a, u) * np.array(u)),
+            (geometry.cross(a, b), np.cross(a, b)),
+        ):
+            np.testing.assert_allclose(ours, numpys, rtol=1e-12, atol=1e-15)
+        rows = np.zeros((2, 3))
+        geometry.set_row(rows, 1, a)
+        assert geometry.row_of(rows, 1) == a and not rows[0].any()
 
 
 def test_small_helpers():

@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from systems.common.signal import example, flat, view
+from systems.common.signals import Estimate
 from systems.motion.endoscope import (
     Endoscope,
     EndoscopeParams,
@@ -68,48 +70,55 @@ def test_it_stays_inside_near_its_fulcrum():
 def test_cone_and_shaft_of_the_block():
     dut = Endoscope()
     context = dut.CreateDefaultContext()
-    estimate = [0.06, 0.02, -0.15, *[0.0] * 12, 1.0, 0.02]
     for known in (1.0, 0.0):
-        estimate[15] = known
-        dut.GetInputPort("target").FixValue(context, estimate)
+        target = example(Estimate)._replace(p=(0.06, 0.02, -0.15), known=known)
+        dut.GetInputPort("target").FixValue(context, flat(target))
         for _ in range(30):
             update = dut.EvalUniquePeriodicDiscreteUpdate(context)
             state = [update.value(group).copy() for group in range(3)]
             for group, vector in enumerate(state):
                 context.SetDiscreteState(group, vector)
-            cone = dut.GetOutputPort("view_cone").Eval(context)
-            shaft = dut.GetOutputPort("shaft").Eval(context)
-            np.testing.assert_array_equal(cone[:6], shaft)
-            assert cone[6] == PARAMS.half_angle
-            assert np.linalg.norm(cone[3:6]) == pytest.approx(1.0)
-            lever = np.cross(cone[:3] - PARAMS.p_WG, cone[3:6])
-            assert np.linalg.norm(lever) < 1e-12
-        assert (np.linalg.norm(state[2]) > 0.01) == (known == 1.0)
+            cone, shaft, camera = (
+                view(signal, dut.GetOutputPort(name).Eval(context))
+                for name, signal in dut.signals.items()
+                if name != "target"
+            )
+            np.testing.assert_array_equal(cone.apex, shaft.tip)
+            np.testing.assert_array_equal(cone.u, shaft.u)
+            np.testing.assert_array_equal(cone.apex, camera.p)
+            assert cone.half == PARAMS.half_angle
+            assert np.linalg.norm(cone.u) == pytest.approx(1.0)
+            assert np.linalg.norm(np.cross(cone.apex - PARAMS.p_WG, cone.u)) < 1e-12
+            np.testing.assert_array_equal(camera.fulcrum, PARAMS.p_WG)
+            assert camera.known == 1.0
+        assert (np.linalg.norm(camera.v) > 0.01) == (known == 1.0)
 
 
 def test_target_that_is_not_finite_is_not_followed():
     dut = Endoscope()
     context = dut.CreateDefaultContext()
-    estimate = [math.nan, 0.02, -0.15, *[0.0] * 12, 1.0, 0.02]
-    dut.GetInputPort("target").FixValue(context, estimate)
-    state = dut.EvalUniquePeriodicDiscreteUpdate(context)
-    np.testing.assert_allclose(state.value(1)[:3], START[:3])
-    np.testing.assert_array_equal(state.value(2), START[3:])
+    target = example(Estimate)._replace(p=(math.nan, 0.02, -0.15))
+    dut.GetInputPort("target").FixValue(context, flat(target))
+    update = dut.EvalUniquePeriodicDiscreteUpdate(context)
+    camera = view(Estimate, update.value(2))
+    np.testing.assert_allclose(camera.p, START[:3])
+    np.testing.assert_array_equal(camera.v, START[3:])
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"period": 0.0}, "period"),
-        ({"p_WG": [0.0]}, "p_WG.*3 finite"),
-        ({"p_WS": [0.0, 0.0, math.nan]}, "p_WS.*3 finite"),
-        ({"p_WS": [0.0, 0.0, 0.1]}, "below the fulcrum"),
+        ({"p_WG": [0.0]}, "p_WG.*3 numbers"),
+        ({"p_WS": [0.0, 0.0, math.nan]}, "p_WS.*3 numbers"),
+        ({"p_WS": [0.0, 0.0, 0.1]}, "p_WS=.*below p_WG"),
         ({"standoff": -0.07}, "standoff"),
         ({"max_insertion": 0.01}, "max_insertion"),
-        ({"half_angle": 35.0}, "in degrees"),
-        ({"rate": 100.0}, "too fast"),
+        ({"half_angle": 35.0}, "half_angle=35.0 rad: .*<= 1.5"),
+        ({"rate": 100.0}, "rate=100.0 1/s: expected > 0 and <= 20"),
+        ({"rate": 10.0, "period": 0.2}, "rate=10.0 1/s: expected less than 1 / period"),
         ({"max_speed": math.inf}, "max_speed"),
-        ({"max_acceleration": 0.01}, "too low.*at least 0.045"),
+        ({"max_acceleration": 0.01}, "max_acceleration=0.01 m/s.2: .*at least.*0.045"),
     ],
 )
 def test_bad_parameters_are_refused(changes, message):

@@ -12,6 +12,8 @@ import pytest
 from plants.arm.arm import SetPoint
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
+from systems.common.signal import flat, size, vector
+from systems.common.signals import ToolMotion
 from systems.motion import joint_commands
 from systems.motion.joint_commands import (
     JointCommands,
@@ -19,9 +21,6 @@ from systems.motion.joint_commands import (
     free_velocity,
     joint_velocity,
 )
-from tests.loosely import loosely
-
-tool_twist = loosely(joint_commands.tool_twist)
 
 PLANT = make_controller_plant()
 TIP = PLANT.GetFrameByName(INSTRUMENT_TIP)
@@ -100,8 +99,9 @@ def test_twist_keeps_the_roll():
     u = np.array([0.1, -0.2, -0.97])
     u /= np.linalg.norm(u)
     du = np.cross([0.3, 0.1, 0.2], u)
-    tool = [0.0, 0.0, -0.1, *u, 0.01, 0.0, 0.0, *du, 1.0]
-    w, v = tool_twist([0.0, 0.0, -0.1], u, tool, 1.0, PERIOD, 0.3)
+    tip = (0.0, 0.0, -0.1)
+    tool = ToolMotion(tip, vector(u), (0.01, 0.0, 0.0), vector(du), 1.0)
+    w, v = joint_commands.tool_twist(tip, vector(u), tool, 1.0, PERIOD, 0.3)
     twist = np.array([*w, *v])
     assert twist[:3] @ u == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(np.cross(twist[:3], u), du, atol=1e-12)
@@ -115,7 +115,7 @@ def follow(tool_at, seconds, params=None):
     simulator = Simulator(dut, context)
     rows = []
     for k in range(round(seconds * 120)):
-        dut.GetInputPort("tool").FixValue(context, tool_at(k / 120))
+        dut.GetInputPort("tool").FixValue(context, flat(tool_at(k / 120)))
         simulator.AdvanceTo((k + 0.5) / 120)
         names = ("posture", "set_point", "status")
         rows.append([np.array(dut.GetOutputPort(n).Eval(context)) for n in names])
@@ -128,16 +128,16 @@ def circle(t, radius=0.02, rate=2.0):
     v = radius * rate * np.array([np.cos(rate * t), np.sin(rate * t), 0.0])
     q = np.linalg.norm(p)
     u = p / q
-    return [*p, *u, *v, *((v - (v @ u) * u) / q), t]
+    return ToolMotion(p, u, v, (v - (v @ u) * u) / q, t)
 
 
 def test_the_posture_follows_a_circle_through_the_fulcrum():
     rows = follow(circle, 3.0)
     for k, (posture, _, status) in enumerate(rows[60:], start=60):
-        tool = np.array(circle((k + 1) / 120))
+        tool = circle((k + 1) / 120)
         _, p, u, _ = kinematics(posture)
-        assert np.linalg.norm(p - tool[:3]) < 1e-4
-        assert np.linalg.norm(u - tool[3:6]) < 1e-3
+        assert np.linalg.norm(p - tool.tip) < 1e-4
+        assert np.linalg.norm(u - tool.u) < 1e-3
         assert status[0] == 0.0
 
 
@@ -152,7 +152,8 @@ def test_set_points_are_the_servos_for_the_motion_and_the_weight():
 
 def test_too_fast_a_command_is_reported_and_bounded():
     def fast(t):
-        return [0.5 * t, 0.0, -0.12, 0, 0, -1, 0.5, 0, 0, 0, 0, 0, t]
+        tip, u, still = (0.5 * t, 0.0, -0.12), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)
+        return ToolMotion(tip, u, (0.5, 0.0, 0.0), still, t)
 
     rows = follow(fast, 0.3, JointCommandsParams(joint_speed=0.05))
     speed = PLANT.GetVelocityUpperLimits() * 0.05
@@ -176,7 +177,7 @@ def test_quadprog_is_asked_only_where_bounds_are_met(monkeypatch):
 
 
 def test_a_command_that_is_no_number_holds_the_arm():
-    rows = follow(lambda t: [np.nan] * 13, 0.1)
+    rows = follow(lambda t: (np.nan,) * size(ToolMotion), 0.1)
     np.testing.assert_allclose(rows[-1][0], READY_POSTURE)
     assert rows[-1][2][0] == 1.0
 

@@ -5,7 +5,7 @@ import pytest
 
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.wrist_law import WristParams
-from tests.benchmarks.wrist_loop import Case, Wall, arcs, run
+from tests.systems.passive_wrist.wrist_loop import Case, Wall, arcs, run
 
 GUESS = [0.012, 0.0, 0.020]
 

@@ -6,6 +6,8 @@ import pytest
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
 from plants.instruments.instrument import InstrumentParams
+from systems.common.signal import view
+from systems.common.signals import RobotTool
 from systems.sensing.robot_location import RobotLocation
 
 
@@ -22,6 +24,6 @@ def test_tip_from_the_measured_joints(length):
         dut.GetInputPort("arm_state").FixValue(context, [*q, *[0.5] * 7])
         plant.SetPositions(plant_context, q)
         tip = plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(plant_context)
-        robot_tool = dut.GetOutputPort("robot_tool").Eval(context)
-        np.testing.assert_allclose(robot_tool[:3], [0.01, 0.02, 0.03])
-        np.testing.assert_allclose(robot_tool[3:], tip.translation(), atol=1e-12)
+        tool = view(RobotTool, dut.GetOutputPort("robot_tool").Eval(context))
+        np.testing.assert_allclose(tool.fulcrum, [0.01, 0.02, 0.03])
+        np.testing.assert_allclose(tool.tip, tip.translation(), atol=1e-12)

@@ -5,7 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from systems.sensing.optical_tracker import MarkerBody, disturb
+from systems.common.signal import vector
+from systems.common.signals import Shaft
+from systems.sensing import optical_tracker
+from systems.sensing.optical_tracker import MarkerBody, MarkerNoise, disturb
 from systems.sensing.shaft_fulcrum import (
     FIRST,
     absorb_line,
@@ -19,6 +22,7 @@ from systems.sensing.trajectory_estimator import (
 )
 
 BODY = MarkerBody()
+MARKERS = optical_tracker.constants(BODY)[0]
 G = np.array([0.02, 0.09, 0.004])
 
 
@@ -34,15 +38,12 @@ def frames(tips, seed, fulcrum=G):
     rng = np.random.default_rng(seed)
     for tip in tips:
         u = (tip - fulcrum) / np.linalg.norm(tip - fulcrum)
-        m = disturb(
-            np.concatenate([tip, u]),
-            rng.standard_normal(6),
-            BODY.lever,
-            BODY.sigma_position(),
-            BODY.sigma_direction(),
+        noise = MarkerNoise(
+            vector(rng.standard_normal(3)), vector(rng.standard_normal(3))
         )
-        c = tuple(p - BODY.lever * d for p, d in zip(m[:3], m[3:], strict=True))
-        yield c, m[3:], tip
+        m = disturb(MARKERS, Shaft(vector(tip), vector(u)), noise)
+        c = tuple(p - BODY.lever * d for p, d in zip(m.tip, m.u, strict=True))
+        yield c, m.u, tip
 
 
 def moving(n):
@@ -53,15 +54,14 @@ def moving(n):
 def track(fulcrum, tips, seed, true=G, state=None):
     if state is None:
         given = fulcrum["fulcrum"].tolist() if fulcrum["given"] else None
-        state = np.array(initial_fulcrum(given))
+        state = initial_fulcrum(given)
     errors, spreads = [], []
     for k, (c, u, tip) in enumerate(frames(tips, seed, true)):
-        first = k == 0 and state[11] == -1.0 and not any(state[3:9])
+        first = k == 0 and state.reference[2] == -1.0 and not any(state.P)
         dt = FIRST if first else 1 / 60
-        state, fused, variance, shared = absorb_line(fulcrum, state, c, u, dt)
-        state = np.array(state)
-        errors.append(np.array(fused) - tip)
-        spreads.append(variance + shared)
+        state, sight = absorb_line(fulcrum, state, c, u, dt)
+        errors.append(np.array(sight.tip) - tip)
+        spreads.append(sight.variance + sight.shared)
     return state, np.array(errors), np.array(spreads)
 
 
@@ -88,17 +88,17 @@ def test_moving_shaft_gives_the_least_squares_intersection():
     M = [np.eye(3) - np.outer(u, u) for _, u, _ in lines]
     rhs = sum(m @ np.array(c) for m, (c, _, _) in zip(M, lines, strict=True))
     batch = np.linalg.solve(sum(M), rhs)
-    np.testing.assert_allclose(state[:3], G, atol=2e-4)
-    np.testing.assert_allclose(state[:3], batch, atol=4e-4)
+    np.testing.assert_allclose(state.g, G, atol=2e-4)
+    np.testing.assert_allclose(state.g, batch, atol=4e-4)
 
 
 def test_fulcrum_error_is_as_large_as_stated():
     squares = []
     for seed in range(40):
         state, _, _ = track(dut(), moving(240), seed)
-        xx, xy, xz, yy, yz, zz = state[3:9]
+        xx, xy, xz, yy, yz, zz = state.P
         P = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        error = np.array(state[:3]) - G
+        error = np.array(state.g) - G
         squares.append(error @ np.linalg.solve(P, error))
     # 3 on average; the drift that is allowed for does not happen: a little less.
     assert 1.0 < np.mean(squares) < 3.9
@@ -110,11 +110,11 @@ def test_tool_at_rest_does_not_move_its_fulcrum_along_the_shaft():
     along = []
     for seed in range(6):
         state, _, _ = track(dut(), np.tile(tip, (900, 1)), seed, true=fulcrum)
-        error = np.array(state[:3]) - fulcrum
+        error = np.array(state.g) - fulcrum
         along.append(error @ u)
         assert np.linalg.norm(error - (error @ u) * u) < 3e-4
         # All that is known along the shaft: the wall's height to 10 mm.
-        assert 0.008 < math.sqrt(state[8]) < 0.0101
+        assert 0.008 < math.sqrt(state.P[5]) < 0.0101
     assert abs(np.mean(along)) < 0.003
 
 
@@ -137,7 +137,7 @@ def test_another_fulcrum_is_noticed():
     other = G + np.array([0.015, -0.01, 0.0])
     tips = moving(600)
     state, errors, _ = track(fulcrum, tips, seed=7, true=other, state=state)
-    np.testing.assert_allclose(state[:3], other, atol=5e-4)
+    np.testing.assert_allclose(state.g, other, atol=5e-4)
     # Meanwhile the tip is never worse than the tracker itself finds it (4 sigma).
     assert np.abs(errors).max() < 4.0 * math.sqrt(fulcrum["var_tip"])
 
@@ -145,5 +145,5 @@ def test_another_fulcrum_is_noticed():
 def test_given_fulcrum_stays():
     fulcrum = dut(given=G.tolist())
     state, errors, _ = track(fulcrum, moving(60), seed=8)
-    np.testing.assert_array_equal(state[:3], G)
+    np.testing.assert_array_equal(state.g, G)
     assert np.sqrt((errors**2).sum(axis=1).mean()) < 0.25e-3

@@ -7,14 +7,19 @@ from pydrake.multibody.math import SpatialForce
 import pytest
 
 from diagrams.common.run import simulate
-from diagrams.common.scenario import load_scenario
+from diagrams.studies import load_scenario
 from diagrams.wrist.diagram import make_wrist_diagram
+from systems.common.signal import flat, view
+from systems.common.signals import Wrench
 from systems.sensing import sensor_noise
 from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
 
 QUIET = [
-    f"tool_wrench.{name}=0.0"
-    for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+    "compare=[]",
+    *(
+        f"tool_wrench.{name}=0.0"
+        for name in ("force_noise", "moment_noise", "force_drift", "moment_drift")
+    ),
 ]
 
 
@@ -27,9 +32,9 @@ def quiet_run():
 
 def test_a_quiet_sensor_reads_the_walls_force_while_the_arm_moves():
     run = quiet_run()
-    f, u = run.matrix("wrist.wrench")[:, :3], run.matrix("wrist.shaft")[:, 3:6]
+    f, u = run.wrist.wrench.f, run.wrist.shaft.u
     lateral = f - u * np.sum(f * u, axis=1)[:, None]
-    force = run.matrix("wall.force")
+    force = run.wall.force.f
     late = run.signals["time"] > 0.1
     assert np.linalg.norm(force[late], axis=1).max() > 0.9  # the probe
     np.testing.assert_allclose(lateral[late], force[late], atol=2e-3)
@@ -37,12 +42,11 @@ def test_a_quiet_sensor_reads_the_walls_force_while_the_arm_moves():
 
 def test_the_moment_tells_the_contacts_depth():
     run = quiet_run()
-    u, s = run.matrix("wrist.shaft")[:, 3:6], run.matrix("wrist.shaft")[:, :3]
-    f, m = run.matrix("wrist.wrench")[:, :3], run.matrix("wrist.wrench")[:, 3:6]
-    force = run.matrix("wall.force")
-    loaded = np.linalg.norm(force, axis=1) > 0.8
-    lever = np.sum(np.cross(u, f) * m, axis=1) / np.sum(np.cross(u, f) ** 2, axis=1)
-    true = np.sum(u * (run.matrix("wall.fulcrum")[:, :3] - s), axis=1)
+    shaft, (f, m, _) = run.wrist.shaft, run.wrist.wrench
+    loaded = np.linalg.norm(run.wall.force.f, axis=1) > 0.8
+    across = np.cross(shaft.u, f)
+    lever = np.sum(across * m, axis=1) / np.sum(across**2, axis=1)
+    true = np.sum(shaft.u * (run.wall.fulcrum.p - shaft.p), axis=1)
     np.testing.assert_allclose(lever[loaded], true[loaded], atol=5e-4)
 
 
@@ -71,30 +75,31 @@ def read(dut: ToolWrench, force: SpatialForce | None = None, time: float = 0.0):
         port.FixValue(context, dut.AllocateInputAbstract(port))
     if force is not None:
         dut.GetInputPort("reaction_forces").FixValue(context, [force])
-    return dut.GetOutputPort("wrench").Eval(context)
+    return view(Wrench, np.array(dut.GetOutputPort("wrench").Eval(context)))
 
 
 def test_taring_takes_the_offset_away():
     kind = dict.fromkeys(("force_noise", "force_drift", "moment_drift"), 0.0)
     tared = read(ToolWrench(ToolWrenchParams(**kind, moment_noise=0.0)))
     left = read(ToolWrench(ToolWrenchParams(**kind, moment_noise=0.0, tare_samples=0)))
-    np.testing.assert_allclose(tared[:3] - left[:3], 0.3, atol=1e-9)
+    np.testing.assert_allclose(tared.f - left.f, 0.3, atol=1e-9)
 
 
 def test_saturated_silent_and_nan_are_not_valid():
     push = SpatialForce([0.0, 0.0, 0.0], [100.0, 0.0, 0.0])
     hole = SpatialForce([0.0, 0.0, 0.0], [float("nan"), 0.0, 0.0])
-    assert read(ToolWrench())[6] == 1.0
-    assert not read(ToolWrench(), push).any()
-    assert not read(ToolWrench(), hole).any()
+    assert read(ToolWrench()).valid == 1.0
+    assert not flat(read(ToolWrench(), push)).any()
+    assert not flat(read(ToolWrench(), hole)).any()
     dut = ToolWrench(ToolWrenchParams(lost=[1.0, 2.0]))
-    assert [read(dut, time=t)[6] for t in (0.5, 1.5, 2.5)] == [1.0, 0.0, 1.0]
+    assert [read(dut, time=t).valid for t in (0.5, 1.5, 2.5)] == [1.0, 0.0, 1.0]
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"force_noise": -0.1}, "force_noise=-0.1: expected >= 0"),
+        ({"force_noise": -0.1}, "tool_wrench.force_noise=-0.1 N: expected >= 0"),
+        ({"force_range": 1e9}, "force_range=1000000000.0 N: expected > 0 and <= 500"),
         ({"lost": [1.0]}, "rising times in pairs"),
         ({"delay": -1}, "delay=-1"),
         ({"mass_error": 3.0}, "mass_error=3.0"),

@@ -1,6 +1,7 @@
 """Trajectory estimator: accuracy, honesty, lost sight, and what it refuses."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -16,8 +17,13 @@ from plants.surgeon.tool_motion import (
     tremor_motion,
     waypoint_motion,
 )
+from systems.common.signal import Vector, flat, vector, view
+from systems.common.signals import Estimate, Shaft, TrackedShaft
+from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import (
+    TOOLS,
     MarkerBody,
+    MarkerNoise,
     OpticalTracker,
     OpticalTrackerParams,
     disturb,
@@ -33,13 +39,34 @@ from systems.sensing.trajectory_estimator import (
 
 DT = 1.0 / 60.0
 BODY = MarkerBody()
+MARKERS = optical_tracker.constants(BODY)[0]
 G = [0.0, 0.09, 0.0]
 
 
 def shaft(tip):
-    u = [p - g for p, g in zip(tip, G, strict=True)]
-    length = math.hypot(*u)
-    return [*tip, *(x / length for x in u)]
+    u = np.subtract(tip, G)
+    return Shaft(vector(tip), vector(u / np.linalg.norm(u)))
+
+
+def frame(tip, time, valid=1.0):
+    """A frame of a tool with its tip at a place."""
+    return TrackedShaft(*shaft(tip), time, valid)
+
+
+THERE = [0.0, 0.0, -0.12]
+
+
+class Row(NamedTuple):
+    """How far an estimate is off, the true speed, and what the estimate says."""
+
+    e_p: Vector
+    e_v: Vector
+    speed: float
+    sigma_p: float
+    sigma_v: float
+    sigma_a: float
+    known: float
+    age: float
 
 
 def track(motion, seed, params=None, seconds=20.0, hidden=(), tremor=1e-4):
@@ -57,20 +84,18 @@ def track(motion, seed, params=None, seconds=20.0, hidden=(), tremor=1e-4):
     for k in range(round(seconds / DT)):
         t = k * DT
         tip = [p + d for p, d in zip(motion(t)[:3], shake(t)[:3], strict=True)]
-        m = disturb(
-            np.array(shaft(tip)),
-            rng.standard_normal(6),
-            BODY.lever,
-            BODY.sigma_position(),
-            BODY.sigma_direction(),
+        noise = MarkerNoise(
+            vector(rng.standard_normal(3)), vector(rng.standard_normal(3))
         )
+        m = disturb(MARKERS, shaft(tip), noise)
         valid = not any(start <= t < end for start, end in hidden)
-        x = absorb(dut, x, np.array([*m, t, float(valid)]))
+        x = absorb(dut, x, TrackedShaft(m.tip, m.u, t, float(valid)))
         estimate = predict(dut, x, t + DT)
         now, d = motion(t + DT), shake(t + DT)
-        e_p = [estimate[i] - now[i] - d[i] for i in range(3)]
-        e_v = [estimate[3 + i] - now[3 + i] for i in range(3)]
-        rows.append([*e_p, *e_v, math.hypot(*now[3:]), *estimate[12:17]])
+        e_p = np.subtract(estimate.p, now[:3]) - d[:3]
+        e_v = np.subtract(estimate.v, now[3:])
+        figures = Row(vector(e_p), vector(e_v), math.hypot(*now[3:]), *estimate[4:])
+        rows.append(flat(figures))
     return np.array(rows)
 
 
@@ -85,14 +110,14 @@ def hand(seed):
 
 
 def test_hand_like_motion_is_followed_and_the_sigmas_are_honest():
-    rows = np.vstack([track(hand(s), s)[120:] for s in range(4)])
-    e_p, e_v, sigma_p, sigma_v = rms(rows[:, :3]), rms(rows[:, 3:6]), *rows[:, 7:9].T
+    rows = view(Row, np.vstack([track(hand(s), s)[120:] for s in range(4)]))
+    e_p, e_v = rms(rows.e_p), rms(rows.e_v)
     # The tracker alone: 0.25/2 sqrt(1 + 2/3 (350/35)^2) = 1.0 mm.
     assert e_p < 0.35e-3
     assert e_v < 7e-3
-    assert 0.6 < e_p / math.sqrt(3.0 * (sigma_p**2).mean()) < 1.1
-    assert 0.6 < e_v / math.sqrt(3.0 * (sigma_v**2).mean()) < 1.1
-    assert rows[:, 10].all()  # never lost
+    assert 0.6 < e_p / math.sqrt(3.0 * (rows.sigma_p**2).mean()) < 1.1
+    assert 0.6 < e_v / math.sqrt(3.0 * (rows.sigma_v**2).mean()) < 1.1
+    assert rows.known.all()  # never lost
 
 
 @pytest.mark.parametrize("speed", [0.01, 0.03, 0.06])
@@ -101,11 +126,10 @@ def test_obstacle_speeds_are_followed(speed):
     leg = 1.875 * 0.06 / speed
     there, back = [-0.03, 0.0, -0.11], [0.03, 0.0, -0.11]
     motion = waypoint_motion([3.0, 3.0 + leg, 3.0 + 2 * leg], [there, back, there])
-    rows = track(motion, 1, seconds=3.0 + 2 * leg)[180:]
-    fast = rows[rows[:, 6] > 0.5 * speed]
-    assert rows[:, 10].all()
-    assert rms(rows[:, :3]) < 0.4e-3
-    assert rms(fast[:, 3:6]) < 6e-3
+    rows = view(Row, track(motion, 1, seconds=3.0 + 2 * leg)[180:])
+    assert rows.known.all()
+    assert rms(rows.e_p) < 0.4e-3
+    assert rms(rows.e_v[rows.speed > 0.5 * speed]) < 6e-3
 
 
 def test_filter_is_consistent_when_its_model_holds():
@@ -137,14 +161,14 @@ def test_filter_is_consistent_when_its_model_holds():
         x = initial(params)
         for k in range(90):
             seen = truth[0] + rng.normal(0.0, s, 3)
-            m = np.array([*seen, 0.0, 0.0, -1.0, k * DT, 1.0])
+            m = TrackedShaft(vector(seen), (0.0, 0.0, -1.0), k * DT, 1.0)
             x = absorb(dut, x, m)
             if k < 89:
                 truth = Phi @ truth + root @ rng.standard_normal((3, 3))
-        assert x[27] == 89 * DT
-        pp, pv, pa, vv, va, aa = x[9:15]
+        assert x.time == 89 * DT
+        pp, pv, pa, vv, va, aa = x.P
         P = np.array([[pp, pv, pa], [pv, vv, va], [pa, va, aa]])
-        error = np.array(x[:9]).reshape(3, 3) - truth
+        error = np.array([x.p, x.v, x.a]) - truth
         nees.append(np.trace(error.T @ np.linalg.solve(P, error)))
     # chi-square with 9 degrees of freedom: mean 9, 4 standard errors of 80 runs.
     assert np.mean(nees) == pytest.approx(9.0, abs=4 * math.sqrt(18 / 80))
@@ -152,10 +176,10 @@ def test_filter_is_consistent_when_its_model_holds():
 
 def test_lost_sight_is_ridden_through_then_unknown_then_resumed():
     motion = waypoint_motion([0.0, 6.0], [[-0.04, 0.0, -0.11], [0.04, 0.0, -0.11]])
-    rows = track(motion, 2, seconds=6.0, hidden=[(3.0, 4.5)])
-    t = (np.arange(len(rows)) + 1) * DT
-    known, sigma, age = rows[:, 10], rows[:, 7], rows[:, 11]
-    error = np.sqrt((rows[:, :3] ** 2).sum(axis=1))
+    rows = view(Row, track(motion, 2, seconds=6.0, hidden=[(3.0, 4.5)]))
+    known, sigma, age = rows.known, rows.sigma_p, rows.age
+    t = (np.arange(len(known)) + 1) * DT
+    error = np.sqrt((rows.e_p**2).sum(axis=1))
     lost = t[(known == 0.0) & (t > 1.0)]
     # It says so within 0.2 to 0.5 s, before the tip is 3 sigma_limit off.
     assert 3.2 < lost[0] < 3.5
@@ -165,13 +189,13 @@ def test_lost_sight_is_ridden_through_then_unknown_then_resumed():
     assert (np.diff(sigma[blind]) > 0.0).all()
     np.testing.assert_allclose(np.diff(age[blind]), DT, atol=1e-9)
     assert (error[blind] < 4.0 * sigma[blind] * math.sqrt(3.0)).all()
-    assert rms(rows[t > 5.0][:, :3]) < 0.4e-3
+    assert rms(rows.e_p[t > 5.0]) < 0.4e-3
 
 
 def test_short_loss_passes_unnoticed():
     motion = waypoint_motion([0.0, 6.0], [[-0.04, 0.0, -0.11], [0.04, 0.0, -0.11]])
-    rows = track(motion, 3, seconds=5.0, hidden=[(3.0, 3.1)])
-    assert rows[30:, 10].all()
+    rows = view(Row, track(motion, 3, seconds=5.0, hidden=[(3.0, 3.1)])[30:])
+    assert rows.known.all()
 
 
 @pytest.fixture
@@ -179,45 +203,44 @@ def settled():
     params = TrajectoryEstimatorParams(fulcrum=G)
     dut, x = constants(params)[0], initial(params)
     for k in range(60):
-        x = absorb(dut, x, np.array([*shaft([0.0, 0.0, -0.12]), k * DT, 1.0]))
+        x = absorb(dut, x, frame(THERE, k * DT))
     return dut, x
 
 
 @pytest.mark.parametrize(
     "measurement",
     [
-        [*shaft([0.0, 0.0, -0.12]), 1.0, 0.0],  # invalid
-        [*shaft([0.0, 0.0, -0.12]), 59 * DT, 1.0],  # seen before
-        [*shaft([0.0, 0.0, -0.12]), 0.5, 1.0],  # older
-        [*shaft([0.03, 0.0, -0.12]), 1.0, 1.0],  # 30 mm in one frame
-        [math.nan, *shaft([0.0, 0.0, -0.12])[1:], 1.0, 1.0],
-        [*shaft([0.0, 0.0, -0.12])[:5], math.nan, 1.0, 1.0],
-        [0.0, 0.0, -0.12, 0.0, 0.0, 0.0, 1.0, 1.0],  # no direction
-        [*shaft([0.0, 0.0, -0.12]), math.nan, 1.0],
-        [*shaft([0.0, 0.0, -0.12]), 1.0, math.nan],
-        [*shaft([0.0, 0.0, -0.12]), math.inf, 1.0],
+        frame(THERE, 1.0, 0.0),  # invalid
+        frame(THERE, 59 * DT),  # seen before
+        frame(THERE, 0.5),  # older
+        frame([0.03, 0.0, -0.12], 1.0),  # 30 mm in one frame
+        frame(THERE, 1.0)._replace(tip=(math.nan, 0.0, -0.12)),
+        frame(THERE, 1.0)._replace(u=(0.0, 0.0, math.nan)),
+        frame(THERE, 1.0)._replace(u=(0.0, 0.0, 0.0)),  # no direction
+        frame(THERE, math.nan),
+        frame(THERE, 1.0, math.nan),
+        frame(THERE, math.inf),
     ],
 )
 def test_bad_measurement_changes_nothing(settled, measurement):
     dut, x = settled
-    after = absorb(dut, x, np.array(measurement))
-    np.testing.assert_array_equal(after, x)
+    assert absorb(dut, x, measurement) == x
 
 
 def test_tool_that_really_jumped_is_found_again(settled):
     dut, x = settled
     for k in range(60, 100):
-        x = absorb(dut, x, np.array([*shaft([0.03, 0.0, -0.12]), k * DT, 1.0]))
+        x = absorb(dut, x, frame([0.03, 0.0, -0.12], k * DT))
     estimate = predict(dut, x, 100 * DT)
-    np.testing.assert_allclose(estimate[:3], [0.03, 0.0, -0.12], atol=1e-3)
-    assert estimate[15] == 1.0
+    np.testing.assert_allclose(estimate.p, [0.03, 0.0, -0.12], atol=1e-3)
+    assert estimate.known == 1.0
 
 
 def test_nothing_is_known_before_the_first_frame():
     params = TrajectoryEstimatorParams()
     estimate = predict(constants(params)[0], initial(params), 0.0)
-    assert np.isfinite(estimate).all()
-    assert estimate[15] == 0.0
+    assert np.isfinite(flat(estimate)).all()
+    assert estimate.known == 0.0
 
 
 def test_block_has_the_frame_in_the_estimate_of_the_same_instant():
@@ -225,23 +248,27 @@ def test_block_has_the_frame_in_the_estimate_of_the_same_instant():
     context = dut.CreateDefaultContext()
     port = dut.GetInputPort("measurement")
     output = dut.GetOutputPort("estimate")
-    port.FixValue(context, [*shaft([0.0, 0.0, -0.12]), 0.5, 1.0])
+    port.FixValue(context, flat(frame(THERE, 0.5)))
+
+    def shown():
+        return view(Estimate, output.Eval(context).copy())
+
     context.SetTime(0.5)
     before = context.get_discrete_state(0).value().copy()
-    estimate = output.Eval(context)
-    np.testing.assert_allclose(estimate[:3], [0.0, 0.0, -0.12], atol=1e-9)
-    np.testing.assert_allclose(estimate[9:12], G)
-    assert estimate[16] == 0.0
+    estimate = shown()
+    np.testing.assert_allclose(estimate.p, THERE, atol=1e-9)
+    np.testing.assert_allclose(estimate.fulcrum, G)
+    assert estimate.age == 0.0
     # Reading it changed no state; time alone makes it older.
     np.testing.assert_array_equal(context.get_discrete_state(0).value(), before)
     context.SetTime(0.6)
-    assert output.Eval(context)[16] == pytest.approx(0.1)
-    assert output.Eval(context)[12] > estimate[12]
+    older = shown()
+    assert older.age == pytest.approx(0.1)
+    assert older.sigma_p > estimate.sigma_p
     # Storing the state changes nothing in what is put out.
-    shown = output.Eval(context).copy()
     updated = dut.EvalUniquePeriodicDiscreteUpdate(context).value().copy()
     context.SetDiscreteState(0, updated)
-    np.testing.assert_array_equal(output.Eval(context), shown)
+    np.testing.assert_array_equal(flat(shown()), flat(older))
 
 
 def test_latency_is_made_up_for_in_the_diagram():
@@ -257,20 +284,21 @@ def test_latency_is_made_up_for_in_the_diagram():
     )
     zeros = builder.AddNamedSystem("zeros", ConstantVectorSource(np.zeros(12)))
     dut = builder.AddNamedSystem("dut", TrajectoryEstimator())
-    for name in "SO":
+    for name in TOOLS:
         builder.Connect(tool.GetOutputPort("shaft"), tracker.GetInputPort(name))
     builder.Connect(zeros.get_output_port(), tracker.GetInputPort("noise"))
     builder.Connect(
-        tracker.GetOutputPort("O_measured"), dut.GetInputPort("measurement")
+        tracker.GetOutputPort("obstacle_measured"), dut.GetInputPort("measurement")
     )
     ports = dut.GetOutputPort("estimate"), tool.GetOutputPort("shaft")
     logs = [LogVectorOutput(port, builder, publish_period=DT) for port in ports]
     simulator = Simulator(builder.Build())
     simulator.AdvanceTo(4.0)
-    estimate, shafts = (log.FindLog(simulator.get_context()).data().T for log in logs)
+    rows = (log.FindLog(simulator.get_context()).data().T for log in logs)
+    estimate, true = map(view, (Estimate, Shaft), rows)
     # Two periods old, and yet where the tool is now: it has moved 1.2 mm since.
-    np.testing.assert_allclose(estimate[5:, 16], 2 * DT, atol=1e-9)
-    error = np.linalg.norm(estimate[60:, :3] - shafts[60:, :3], axis=1)
+    np.testing.assert_allclose(estimate.age[5:], 2 * DT, atol=1e-9)
+    error = np.linalg.norm(estimate.p[60:] - true.tip[60:], axis=1)
     assert error.max() < 0.1e-3
 
 
@@ -285,8 +313,8 @@ def test_latency_is_made_up_for_in_the_diagram():
         ({"age_limit": 0.001}, "at least the period"),
         ({"tremor_rms": -1e-4}, "tremor_rms"),
         ({"wall_height": math.nan}, "wall_height"),
-        ({"fulcrum": [0.0, 0.0]}, "fulcrum.*or null"),
-        ({"fulcrum": [0.0, 0.0, math.nan]}, "fulcrum.*or null"),
+        ({"fulcrum": [0.0, 0.0]}, "fulcrum=.*3 numbers >= -1"),
+        ({"fulcrum": [0.0, 0.0, math.nan]}, "fulcrum=.*3 numbers >= -1"),
         ({"body": MarkerBody(lever=math.nan)}, "lever"),
     ],
 )

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from systems.switching.fields import helicoid_field
+from systems.switching.signals import Seen
 from systems.switching.statechart_planner import (
     Manoeuvre,
     StatechartParams,
@@ -21,8 +22,9 @@ def random_cases(count):
     while count:
         p, goal = (0.0, 0.0), (rng.uniform(4.0, 9.0), 0.0)
         rho = rng.uniform(0.4, 1.0)
-        obstacle = (1.0, rng.uniform(1.2, 3.0), rng.uniform(-1, 1) * rho, 0.1, 0.0, 0.0)
-        if goal[0] - obstacle[1] > rho + 0.1:
+        x, y = rng.uniform(1.2, 3.0), rng.uniform(-1, 1) * rho
+        obstacle = Seen(1.0, x, y, 0.1, 0.0, 0.0)
+        if goal[0] - x > rho + 0.1:
             count -= 1
             yield p, goal, obstacle, rho
 
@@ -30,7 +32,7 @@ def random_cases(count):
 def test_circles_are_tangent_and_the_heading_never_jumps():
     for p, goal, obstacle, rho in random_cases(200):
         m = bypass(p, goal, obstacle, rho, 0.5)
-        o = np.array(obstacle[1:3])
+        o = np.array([obstacle.x, obstacle.y])
         omega = np.array([m.omega_x, m.omega_y])
         a = np.linalg.norm(omega - p)
         assert np.linalg.norm(omega - o) == pytest.approx(a + rho)
@@ -49,8 +51,9 @@ def test_circles_are_tangent_and_the_heading_never_jumps():
 
 
 def test_only_what_stands_in_the_tube_counts():
-    before, behind = (0.0, 3.0, 0.1, 0.3, 0.0, 0.0), (1.0, 9.5, 0.0, 0.3, 0.0, 0.0)
-    beside = (2.0, 3.0, 1.0, 0.3, 0.0, 0.0)
+    before = Seen(0.0, 3.0, 0.1, 0.3, 0.0, 0.0)
+    behind = Seen(1.0, 9.5, 0.0, 0.3, 0.0, 0.0)
+    beside = Seen(2.0, 3.0, 1.0, 0.3, 0.0, 0.0)
     assert in_tube((0.0, 0.0), (9.0, 0.0), [behind, beside], 0.3) is None
     assert in_tube((0.0, 0.0), (9.0, 0.0), [behind, before], 0.3) is before
 
@@ -58,7 +61,8 @@ def test_only_what_stands_in_the_tube_counts():
 @pytest.mark.parametrize("offset", [-0.3, 0.0, 0.3])
 def test_a_point_passes_an_obstacle_at_its_safety_circle(offset):
     params = StatechartParams()
-    state, place, seen = Manoeuvre(), (0.0, 0.0), [(0.0, 4.0, offset, 0.5, 0.0, 0.0)]
+    state, place = Manoeuvre(), (0.0, 0.0)
+    seen = [Seen(0.0, 4.0, offset, 0.5, 0.0, 0.0)]
     least, states = 9.0, []
     for _ in range(2500):
         vx, vy, state = statechart_step(params, state, place, (8.0, 0.0), seen)
@@ -71,5 +75,5 @@ def test_a_point_passes_an_obstacle_at_its_safety_circle(offset):
 
 
 def test_bad_parameters_are_refused():
-    with pytest.raises(ValueError, match=r"margin=-0.1 must be positive"):
+    with pytest.raises(ValueError, match=r"statechart.margin=-0.1 m: expected >= 0.02"):
         StatechartPlanner(StatechartParams(margin=-0.1))

@@ -1,12 +1,15 @@
 """The switching planner: its rules, its limits, its speed."""
 
-from math import hypot, inf, nan
+from math import dist, hypot, inf, nan
 import statistics
+import subprocess
+import sys
 from time import perf_counter
 
 import numpy as np
 import pytest
 
+from systems.switching.signals import Seen
 from systems.switching.switching_planner import SwitchingPlanner
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import (
@@ -33,14 +36,14 @@ def walk(discs, duration=60.0, goal=(8.0, 0.0), vision=3.0):
     for k in range(int(duration / 0.05)):
         t = 0.05 * k
         now = [
-            (float(i), x + t * u, y + t * v, r, u, v)
+            Seen(float(i), x + t * u, y + t * v, r, u, v)
             for i, (x, y, r, u, v) in enumerate(discs)
         ]
-        seen = [o for o in now if hypot(o[1] - place[0], o[2] - place[1]) <= vision]
+        seen = [o for o in now if dist((o.x, o.y), place) <= vision]
         vx, vy, state, *_ = step(seen, place, state, goal)
         place = (place[0] + 0.05 * vx, place[1] + 0.05 * vy)
         modes.append(int(state.mode))
-        gaps = [hypot(o[1] - place[0], o[2] - place[1]) - o[3] - 0.18 for o in now]
+        gaps = [dist((o.x, o.y), place) - o.radius - 0.18 for o in now]
         least = min([least, *gaps])
         if hypot(place[0] - goal[0], place[1] - goal[1]) < 0.1:
             break
@@ -54,14 +57,14 @@ def test_alone_it_goes_straight_and_slows_down_at_the_goal():
 
 
 def test_what_does_not_stand_in_the_way_does_not_matter():
-    behind_goal = (0.0, 8.8, 0.0, 0.4, 0.0, 0.0)
-    beside = (1.0, 2.0, 1.2, 0.4, 0.0, 0.0)
-    passing = (2.0, 2.0, 1.5, 0.4, 0.0, 0.5)
+    behind_goal = Seen(0.0, 8.8, 0.0, 0.4, 0.0, 0.0)
+    beside = Seen(1.0, 2.0, 1.2, 0.4, 0.0, 0.0)
+    passing = Seen(2.0, 2.0, 1.5, 0.4, 0.0, 0.5)
     assert step([behind_goal, beside, passing]).state.mode == ATTRACTIVE
 
 
 def test_the_field_followed_is_one_obstacles_tangent():
-    result = step([(5.0, 2.0, 0.1, 0.4, 0.0, 0.0)])
+    result = step([Seen(5.0, 2.0, 0.1, 0.4, 0.0, 0.0)])
     assert (result.state.mode, result.state.track, result.state.side) == (BYPASS, 5, 1)
     rho = 0.4 + 0.18 + 0.2
     # Distance of the centre from the ray: the safety circle's radius.
@@ -70,7 +73,7 @@ def test_the_field_followed_is_one_obstacles_tangent():
 
 
 def test_a_crosser_is_passed_behind():
-    result = step([(0.0, 2.0, -2.0, 0.3, 0.0, 0.5 * 0.9)])
+    result = step([Seen(0.0, 2.0, -2.0, 0.3, 0.0, 0.5 * 0.9)])
     assert result.state.mode == BYPASS and result.v_y < 0.0
 
 
@@ -102,20 +105,33 @@ def test_a_goal_walled_in_is_given_up():
 
 
 def test_a_faster_obstacle_is_told():
-    fast = (0.0, 3.0, 0.0, 0.3, -0.8, 0.0)
+    fast = Seen(0.0, 3.0, 0.0, 0.3, -0.8, 0.0)
     result = step([fast])
     assert result.outrun and hypot(result.v_x, result.v_y) > 0.0
-    assert not step([(0.0, 3.0, 0.0, 0.3, -0.4, 0.0)]).outrun
+    assert not step([Seen(0.0, 3.0, 0.0, 0.3, -0.4, 0.0)]).outrun
 
 
 def test_within_a_safety_circle_it_leads_out():
-    result = step([(0.0, 0.4, 0.0, 0.2, 0.0, 0.0)])
+    result = step([Seen(0.0, 0.4, 0.0, 0.2, 0.0, 0.0)])
     assert result.v_x < 0.01
+
+
+def test_the_rules_need_no_drake():
+    code = (
+        "import sys, systems.switching.switching_rules; "
+        "sys.exit(any(name.startswith('pydrake') for name in sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_plain_tuples_will_do():
+    crosser = (0.0, 2.0, -2.0, 0.3, 0.0, 0.45)
+    assert step([crosser]) == step([Seen(*crosser)])
 
 
 def test_numbers_that_are_none_are_refused():
     with pytest.raises(ValueError, match="not finite"):
-        step([(0.0, nan, 0.0, 0.3, 0.0, 0.0)])
+        step([Seen(0.0, nan, 0.0, 0.3, 0.0, 0.0)])
     with pytest.raises(ValueError, match="not finite"):
         step([], place=(nan, 0.0))
 
@@ -123,13 +139,13 @@ def test_numbers_that_are_none_are_refused():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"body_radius": 0.0}, r"body_radius=0.0 must be positive"),
-        ({"speed": -1.0}, r"speed=-1.0 must be positive"),
-        ({"margins": [0.1, 0.2]}, r"margins=\[0.1, 0.2\] must fall; nearest \[0.2"),
-        ({"margins": []}, r"margins=\[\] must be distances"),
-        ({"slower": [1.5]}, r"slower=\[1.5\] must be fractions"),
-        ({"vision": 0.3}, r"vision=0.3 m must be greater"),
-        ({"hysteresis": nan}, r"hysteresis=nan must be >= 0"),
+        ({"body_radius": 0.0}, r"switching.body_radius=0.0 m: expected >= 0.05"),
+        ({"speed": -1.0}, r"switching.speed=-1.0 m/s: expected > 0"),
+        ({"margins": [0.1, 0.2]}, r"margins=\[0.1, 0.2\] m: expected falling: \[0.2"),
+        ({"margins": []}, r"margins=\[\] m: expected at least one"),
+        ({"slower": [1.5]}, r"slower=\[1.5\]: expected .* <= 0.95"),
+        ({"vision": 0.3}, r"vision=0.3 m: expected > 0.38, body_radius"),
+        ({"hysteresis": nan}, r"hysteresis=nan rad: expected >= 0"),
     ],
 )
 def test_bad_parameters_are_refused(change, message):
@@ -147,7 +163,8 @@ def test_speed(count, limit):
         places += np.sign(places)
         w = rng.uniform(-0.3, 0.3, (count, 2))
         seen = [
-            (float(k), *places[k].tolist(), 0.3, *w[k].tolist()) for k in range(count)
+            Seen(float(k), *places[k].tolist(), 0.3, *w[k].tolist())
+            for k in range(count)
         ]
         start = perf_counter()
         step(seen)

@@ -138,10 +138,13 @@ def test_procedures_are_saved_and_loaded(tmp_path):
     ("procedure", "message"),
     [
         (Procedure("entri"), "kind='entri'"),
-        (Procedure("elementary"), "position=None, expected three"),
+        (Procedure("elementary"), "position=None m: expected three"),
         (Procedure("entry", position=[0, 0, 0]), "the channel's"),
-        (Procedure("elementary", [0, 0, 0], [0, 0, 0]), "no direction"),
-        (Procedure("entry", radius=0.003), "less than the tool's own"),
+        (
+            Procedure("elementary", [0, 0, 0], [0, 0, 0]),
+            "expected a direction",
+        ),
+        (Procedure("entry", radius=0.003), "the tool's own"),
         (Procedure("entry", length=-1.0), "length=-1.0"),
         (Procedure("entry", pitch=0.0), "pitch=0.0"),
     ],

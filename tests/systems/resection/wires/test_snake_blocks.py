@@ -14,20 +14,22 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS
 from plants.snake.weight import weight
+from systems.common.parameter import check
 from systems.resection.wires.resection_ik import (
     HOLD,
-    Motion,
     ResectionIk,
     ResectionIkParams,
+    follow,
+    standing,
     time_between,
 )
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tip_reference import (
     CircleParams,
+    PoseParams,
     TipReference,
     TipReferenceParams,
-    ToolPose,
-    circle_pose,
+    circle_target,
     reference,
 )
 from systems.resection.wires.wire_drums import WireDrums, WireDrumsParams
@@ -35,11 +37,12 @@ from systems.resection.wires.wire_forward_actuation import WireForwardActuation
 from systems.resection.wires.wire_inverse_actuation import (
     WireInverseActuation,
     WireInverseActuationParams,
+    wound_lengths,
 )
 from systems.resection.wires.wire_tension import WireTension, WireTensionParams
 from systems.resection.wires.wire_watch import WireWatch, WireWatchParams
 
-SNAKE = SnakeParams().check()
+SNAKE, DRIVE = SnakeParams(), SnakeDriveParams()
 BENDS = [0.01, 0.4, 0.3, -1.2, 0.5, 2.5, 0.7]
 POSTURE = posture_of(BENDS)
 STRAIGHT = [*wire_lengths(np.zeros(7), SNAKE), 0.0]
@@ -91,12 +94,13 @@ def test_resection_ik_approaches_a_far_target_smoothly_and_meets_it():
 
 def test_a_slow_goal_is_met_exactly():
     params = ResectionIkParams()
-    motion = Motion([0.0] * 7, [0.0] * 7, [0.0] * 7)
+    motion = standing(np.zeros(7))
     for k in range(1, 50):
-        goal = [0.0, *[0.5 * params.bend_rate * params.period * k] * 6]
-        motion = motion.follow(goal, params)
+        goal = np.array([0.0, *[0.5 * params.bend_rate * params.period * k] * 6])
+        motion = follow(motion, goal, params)
         np.testing.assert_allclose(motion.x, goal, atol=1e-15)
-    assert time_between(motion.x, [0.03, *motion.x[1:]], params) == pytest.approx(1.0)
+    shift = np.array([params.travel_rate, *[0.0] * 6])
+    assert time_between(motion.x, motion.x + shift, params) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -127,9 +131,9 @@ def test_inverse_and_forward_actuation_undo_each_other():
     np.testing.assert_allclose(desired, [*POSTURE, *[0.0] * 7], atol=1e-10)
 
 
-def test_forward_actuation_leads_by_lag_and_hold():
+def test_forward_actuation_leads_by_lag_and_period():
     drive = SnakeDriveParams()
-    dut = WireForwardActuation(hold=0.02)
+    dut = WireForwardActuation(period=0.02)
     later = np.array(POSTURE) + 1e-3 * np.array([1, 0.1, 0.2, 0.1, -0.2, 0, 0.1])
     one = np.array([*wire_lengths(POSTURE, SNAKE), POSTURE[0]])
     two = np.array([*wire_lengths(later, SNAKE), later[0]])
@@ -137,6 +141,36 @@ def test_forward_actuation_leads_by_lag_and_hold():
     context = fixed(dut, lengths=one, rates=(two - one) / lead)
     desired = out(dut, context, "desired_state")
     np.testing.assert_allclose(desired[1:7], later[1:], atol=1e-6)
+
+
+@pytest.mark.parametrize("broken", [math.nan, math.inf, 1.0])
+def test_broken_lengths_leave_the_set_point_where_it_was(broken):
+    """No numbers, or a length that no posture has."""
+    dut = WireForwardActuation()
+    drums = np.append(wire_lengths(POSTURE, SNAKE), POSTURE[0])
+    context = fixed(dut, lengths=drums, rates=np.zeros(10))
+    before = out(dut, context, "desired_state")
+    tick(dut, context)
+    for wire in (0, 8):
+        worse = drums.copy()
+        worse[wire] = broken
+        dut.GetInputPort("lengths").FixValue(context, worse)
+        np.testing.assert_array_equal(out(dut, context, "desired_state"), before)
+        tick(dut, context)
+
+
+def test_a_broken_posture_leaves_the_drums_where_they_were():
+    dut = WireInverseActuation(posture=POSTURE)
+    context = fixed(dut, posture=np.full(7, math.nan))
+    held = wound_lengths(POSTURE, WireInverseActuationParams(), SNAKE, DRIVE)
+    np.testing.assert_array_equal(out(dut, context, "drums"), held)
+    other = posture_of([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+    dut.GetInputPort("posture").FixValue(context, other)
+    good = out(dut, context, "drums")
+    assert (good != held).any()
+    tick(dut, context)
+    dut.GetInputPort("posture").FixValue(context, [math.inf] * 7)
+    np.testing.assert_array_equal(out(dut, context, "drums"), good)
 
 
 def test_sag_is_made_up_for():
@@ -261,25 +295,33 @@ def test_watch_raises_one_alarm_and_keeps_it():
     np.testing.assert_allclose(out(dut, context, "alarm"), [0.08, 3.0])
 
 
+def test_a_tension_that_is_no_number_counts_as_slack():
+    dut = WireWatch(WireWatchParams(samples=1))
+    context = fixed(dut, tension=[4.0] * 4 + [math.nan] + [4.0] * 4)
+    tick(dut, context)
+    assert out(dut, context, "stop") == [1.0]
+    np.testing.assert_array_equal(out(dut, context, "alarm"), [0.0, 2.0])
+
+
 def test_reference_circle():
     circle = CircleParams(p_WC=[0.0, 0.01, 0.04], n_WT=[0.0, 1.0, 1.0])
     n = np.array(circle.n_WT) / math.sqrt(2)
     for time in np.linspace(0.0, 5.0, 40):
-        v = np.array(circle_pose(circle, time))
-        offset = v[:3] - circle.p_WC
+        target = circle_target(circle, time)
+        offset = np.subtract(target.p, circle.p_WC)
         assert np.linalg.norm(offset) == pytest.approx(circle.radius)
         assert offset @ n == pytest.approx(0.0, abs=1e-15)
-        assert math.acos(v[6:] @ n) == pytest.approx(circle.lean)
-    full = np.array(circle_pose(circle, 5.0)) - circle_pose(circle, 1.0)
-    np.testing.assert_allclose(full, 0.0, atol=1e-12)
+        assert math.acos(target.n_I @ n) == pytest.approx(circle.lean)
+    one, other = circle_target(circle, 1.0), circle_target(circle, 5.0)
+    np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 def test_reference_poses_take_turns():
-    poses = [ToolPose(p_WT=[0.0, 0.0, 0.04]), ToolPose(p_WT=[0.01, 0.0, 0.04])]
+    poses = [PoseParams(p_WT=[x, 0.0, 0.04]) for x in (0.0, 0.01)]
     params = TipReferenceParams(poses=poses, dwell=2.0, lead=0.02)
-    assert reference(params, 1.99)[0] == 0.0
-    assert reference(params, 2.0)[0] == 0.01
-    assert reference(params, 4.1)[0] == 0.0
+    assert reference(params, 1.99).p[0] == 0.0
+    assert reference(params, 2.0).p[0] == 0.01
+    assert reference(params, 4.1).p[0] == 0.0
     dut = TipReference(params)
     context = dut.CreateDefaultContext()
     context.SetTime(1.99)
@@ -290,32 +332,38 @@ def test_reference_poses_take_turns():
 @pytest.mark.parametrize(
     ("params", "message"),
     [
-        (ResectionIkParams(bend_rate=0.0), "resection_ik.bend_rate=0.0: expected > 0"),
+        (
+            ResectionIkParams(bend_rate=0.0),
+            "resection_ik.bend_rate=0.0 rad/s: expected",
+        ),
         (WireDrumsParams(wire_rate=-1.0), "wire_drums.wire_rate=-1.0"),
-        (WireInverseActuationParams(stiffness=-1.0), "stiffness=-1.0: expected >= 0"),
+        (
+            WireInverseActuationParams(stiffness=-1.0),
+            "stiffness=-1.0 N/m: expected",
+        ),
         (WireTensionParams(least=-1.0), "wire_tension.least=-1.0 N: expected >= 0"),
         (WireWatchParams(samples=0), "wire_watch.samples=0: expected >= 1"),
-        (WireWatchParams(period=0.0), "wire_watch.period=0.0 s: expected > 0"),
+        (WireWatchParams(period=0.0), "wire_watch.period=0.0 s: expected >= 0.001"),
         (
             ElasticWiresParams(breaks=[WireBreak(9)]),
-            "wire=9, expected 0 to 8; nearest 8",
+            r"elastic_wires.breaks\[0\].wire=9: expected >= 0 and <= 8",
         ),
         (
             ElasticWiresParams(breaks=[WireBreak(1, -1.0)]),
-            r"time=-1.0 s, expected >= 0",
+            r"breaks\[0\].time=-1.0 s: expected >= 0",
         ),
-        (TipReferenceParams(dwell=0.0), "tip_reference.dwell=0.0: expected > 0"),
+        (TipReferenceParams(dwell=0.0), "tip_reference.dwell=0.0 s: expected >= 0.1"),
         (TipReferenceParams(lead=-1.0), "tip_reference.lead=-1.0 s"),
         (
-            TipReferenceParams(poses=[ToolPose(n_WT=[0.0, 0.0, 0.0])]),
+            TipReferenceParams(poses=[PoseParams(n_WT=[0.0, 0.0, 0.0])]),
             r"poses\[0\].n_WT=.*expected a direction",
         ),
         (
-            TipReferenceParams(poses=[ToolPose(p_WT=[0.0])]),
-            r"poses\[0\].p_WT=.*three finite numbers",
+            TipReferenceParams(poses=[PoseParams(p_WT=[0.0])]),
+            r"poses\[0\].p_WT=.*expected 3 numbers",
         ),
     ],
 )
 def test_bad_parameters_are_refused(params, message):
     with pytest.raises(ValueError, match=message):
-        params.check()
+        check(params)

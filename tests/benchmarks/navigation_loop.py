@@ -4,17 +4,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from time import perf_counter
+from typing import Any
 
-from systems.switching.unicycle_control import UnicycleControlParams, heading_law
-from tests.benchmarks.scenes import Frame, Robot, Scene
-
-Seen = list[tuple[float, float, float, float, float, float]]
-"""Track identity, x, y, radius, v_x, v_y of the obstacles in sight."""
+from systems.switching.signals import Seen
+from systems.switching.unicycle_control import (
+    UnicycleControlParams,
+    constants,
+    heading_law,
+)
+from tests.benchmarks.navigation_scenes import Frame, Robot, Scene
 
 Command = tuple[float, float, bool]
 """Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
 
-Step = Callable[[float, float, float, float, float, Seen], Command]
+Step = Callable[[float, float, float, float, float, list[Seen]], Command]
 """(x, y, heading, v_x, v_y, obstacles in sight) -> what to do."""
 
 Planner = Callable[[Scene], Step]
@@ -43,8 +46,18 @@ def closest(qx: float, qy: float, ux: float, uy: float, dt: float) -> float:
     return hypot(qx + t * ux, qy + t * uy)
 
 
+def control_law(robot: Robot) -> Any:
+    """The record that the heading law takes."""
+    return constants(
+        UnicycleControlParams(
+            4.0, robot.speed, robot.turn_rate, robot.turn_acceleration
+        )
+    )[0]
+
+
 def unicycle(
     robot: Robot,
+    law: Any,
     pose: tuple[float, float, float],
     speeds: tuple[float, float],
     wanted: Command,
@@ -53,9 +66,6 @@ def unicycle(
     """One step of the heading law on a unicycle with limited accelerations."""
     x, y, theta = pose
     speed, rate = speeds
-    law = UnicycleControlParams(
-        4.0, robot.speed, robot.turn_rate, robot.turn_acceleration
-    )
     target, turn = heading_law(law, theta, *wanted)
     dv = robot.acceleration * dt
     dw = robot.turn_acceleration * dt
@@ -78,6 +88,7 @@ def run(scene: Scene, planner: Planner) -> Result:
     speeds = (0.0, 0.0)
     vx = vy = 0.0
     step = planner(scene)
+    law = None if robot.holonomic else control_law(robot)
     clearance, length = float("inf"), 0.0
     walls: list[float] = []
     path = [(x, y)]
@@ -87,7 +98,7 @@ def run(scene: Scene, planner: Planner) -> Result:
     frame: Frame = scene.frames(0)
     for k in range(int(scene.time_limit / dt)):
         seen = [
-            (float(i), a, b, r, u, v)
+            Seen(float(i), a, b, r, u, v)
             for i, (a, b, r, u, v) in enumerate(frame)
             if hypot(a - x, b - y) <= robot.vision
         ]
@@ -100,7 +111,9 @@ def run(scene: Scene, planner: Planner) -> Result:
             vx, vy = wanted[0] * scale, wanted[1] * scale
             nx, ny = x + dt * vx, y + dt * vy
         else:
-            (nx, ny, theta), speeds = unicycle(robot, (x, y, theta), speeds, wanted, dt)
+            (nx, ny, theta), speeds = unicycle(
+                robot, law, (x, y, theta), speeds, wanted, dt
+            )
             vx, vy = (nx - x) / dt, (ny - y) / dt
         after = scene.frames(k + 1)
         for (a, b, r, _, _), (c, d, _, _, _) in zip(frame, after, strict=True):

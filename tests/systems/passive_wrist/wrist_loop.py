@@ -12,6 +12,14 @@ from math import exp, pi, sqrt
 import numpy as np
 
 from plants.abdomen.wall_motion import wave
+from systems.common.signal import flat, reader, vector
+from systems.common.signals import (
+    Fulcrum,
+    MovingPoint,
+    ShaftMotion,
+    ToolMotion,
+    Wrench,
+)
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_tracker import FulcrumTracker
 from systems.passive_wrist.wrist_law import (
@@ -26,6 +34,7 @@ from systems.passive_wrist.wrist_law import (
 )
 
 LENGTH, INSIDE = 0.40, 0.18
+read_fulcrum = reader(Fulcrum)
 
 
 @dataclass
@@ -118,7 +127,7 @@ def run(case: Case) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(case.seed)
     dt = case.fulcrum.period
     estimator = FulcrumTracker(case.fulcrum)
-    law = constants(case.wrist)
+    law = constants(case.wrist)[0]
     z, state = estimator.initial(), initial(case.wrist)
     tip = case.tip or hold
     wall = case.wall
@@ -154,21 +163,22 @@ def run(case: Case) -> dict[str, np.ndarray]:
         mm = m + mbias + rng.normal(0, case.moment_noise, 3)
         late.append((fm, mm))
         fm, mm = late[max(0, len(late) - 1 - case.delay)]
-        shaft = np.concatenate([p_WS, u, dx[:3], du])
-        z = estimator.step(z, shaft, np.concatenate([fm, mm, [1.0]]), t)
-        truth = np.concatenate([p_WI, v_WI])
-        p_WP, v_WP = tip(t)
-        wanted = np.array([*p_WP, 0.0, 0.0, -1.0, *v_WP, 0.0, 0.0, 0.0, t])
-        wrench = np.concatenate([fm, mm, [1.0]])
-        report = estimator.report(z, u, t)
-        state = next_state(law, state, wanted, shaft, wrench, report, truth, t)
-        C = estimator.covariance(z)
-        across, along, stiffness = report[6], report[7], report[8]
+        shaft = ShaftMotion(*map(vector, (p_WS, u, dx[:3], du)))
+        wrench = Wrench(vector(fm), vector(mm), 1.0)
+        z = estimator.step(z, flat(shaft), flat(wrench), t)
+        truth = MovingPoint(vector(p_WI), vector(v_WI))
+        p_WP, v_WP = map(vector, tip(t))
+        wanted = ToolMotion(p_WP, (0.0, 0.0, -1.0), v_WP, (0.0, 0.0, 0.0), t)
+        report = read_fulcrum(estimator.report(z, t, flat(shaft)))
+        known = case.wrist.mode == "known"
+        seen = truth if known else MovingPoint(report.p, report.v)
+        state = next_state(law, state, t, wanted, shaft, wrench, report, seen)
+        C = estimator.covariance(z).reshape(3, 3)
         pose = command(state, wanted)
-        p_d, u_d, v_d, du_d = (np.array(pose[k : k + 3]) for k in (0, 3, 6, 9))
+        p_d, u_d, v_d, du_d = map(np.array, pose[:4])
         goal = np.concatenate([p_d - LENGTH * u_d, p_d])
         dgoal = np.concatenate([v_d - LENGTH * du_d, v_d])
-        error = report[0:3] - p_WI
+        error = report.p - p_WI
         rows.append(
             (
                 t,
@@ -176,9 +186,9 @@ def run(case: Case) -> dict[str, np.ndarray]:
                 float(np.linalg.norm(r)),
                 *error,
                 float(np.linalg.norm(error - u * (u @ error))),
-                across,
-                along,
-                stiffness,
+                report.sigma_across,
+                report.sigma_along,
+                report.stiffness,
                 float(error @ np.linalg.solve(C, error)),
                 estimator.breathing(z),
                 state[FROZEN],

@@ -1,20 +1,26 @@
-"""Random scenes in which the obstacle tool O stands or moves across the robot's way.
+"""Random scenes in which the obstacle tool O is in the robot's way.
 
 The recipe: a dome of 100 to 120 mm radius over a floor at z = -65 mm (frame W
 here has its origin in the dome's center). The fulcrums G_R and G_O lie on the
 dome within 65 degrees of its top, 60 mm or more apart. Start tip, target and O's
-tip lie inside, 80 to 160 mm from their fulcrums; the way is 30 mm or longer, and
-the straight motion touches O. The start pose is clear of O by 5 mm (10 where O
-moves), the final pose by 3 mm. A standing O is 26.5 mm or more from G_R. A moving
-O's tip wanders between random points for 7 s at a speed of 10 to 60 mm/s drawn for
-the scene, with 400 mm/s^2, always 30 mm or more from G_R, and comes to rest where
-it leaves the final pose free. Tools are 5 mm thick.
+tip lie inside, 80 to 160 mm from their fulcrums, and the way is 30 mm or longer.
+Tools are 5 mm thick.
 
-Scene k of a set depends on the seed, the kind and k only.
+- "standing", "moving": the straight motion touches O. The start pose is clear of O by
+  5 mm (10 where O moves), the final pose by 3 mm. A standing O is 26.5 mm or more from
+  G_R. A moving O's tip wanders between random points for 7 s at a speed of 10 to
+  60 mm/s drawn for the scene, with 400 mm/s^2, always 30 mm or more from G_R, and comes
+  to rest where it leaves the final pose free.
+- "blocked": O stands on the target's own line, within D_safe of the final pose, for
+  6 s; then it leaves at 40 mm/s for a place that frees it.
+- "crowded": one or two more tools stand in the cavity besides the standing one; start
+  and final pose are clear of all, and all leave 26.5 mm at G_R.
+
+A scene depends on the seed, the kind and its number only.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, pi, sin, sqrt
 
 import numpy as np
@@ -32,10 +38,17 @@ from systems.common.geometry import (
 CONTACT = 0.005
 """Distance of the axes at contact, m: two radii of 2.5 mm."""
 
-KINDS = ("standing", "moving")
+_STREAMS = {"standing": 0, "moving": 1, "blocked": 11, "crowded": 12}
+KINDS = tuple(_STREAMS)
 _WANDER_TIME = 7.0
 _ACCELERATION = 0.4
+_BLOCKED_TIME = 6.0
+_LEAVING_SPEED = 0.04
+_FREE = CONTACT + 0.003
+_BLOCKED = 0.007
+_FROM_G_R = 0.0265
 _TRIES = 1000
+_FEW_TRIES = 300
 
 
 @dataclass(frozen=True)
@@ -139,48 +152,114 @@ def scene(kind: str, seed: int, number: int) -> Scene:
     """Draws a scene.
 
     Args:
-        kind: "standing" or "moving".
+        kind: One of KINDS.
         seed: The set's seed.
         number: Of the scene in its set.
 
     Raises:
-        ValueError: If the kind is neither.
+        ValueError: If there is no such kind.
     """
     if kind not in KINDS:
         raise ValueError(f"kind={kind!r} must be one of {', '.join(KINDS)}")
-    rng = np.random.default_rng([seed, KINDS.index(kind), number])
+    rng = np.random.default_rng([seed, _STREAMS[kind], number])
+    if kind == "crowded":
+        return _draw_crowded(rng, seed, number)
     while True:
-        drawn = _draw(rng, kind == "moving")
+        drawn = _draw_blocked(rng) if kind == "blocked" else _draw(rng, kind)
         if drawn is not None:
             return drawn
 
 
-def _draw(rng: np.random.Generator, moving: bool) -> Scene | None:
+def _draw(rng: np.random.Generator, kind: str) -> Scene | None:
     """One try; None if it breaks a rule."""
     dome = rng.uniform(0.1, 0.12)
-    g_r, g_o = draw_fulcrum(rng, dome), draw_fulcrum(rng, dome)
+    g_r, g_o = _draw_fulcrum(rng, dome), _draw_fulcrum(rng, dome)
     if norm(sub(g_r, g_o)) < 0.06:
         return None
-    start, goal, tip = (draw_tip(rng, dome, g) for g in (g_r, g_r, g_o))
+    start, goal, tip = (_draw_tip(rng, dome, g) for g in (g_r, g_r, g_o))
     if norm(sub(goal, start)) < 0.03:
         return None
     if segment_triangle_distance(g_o, tip, g_r, start, goal) >= CONTACT:
         return None
-    room = 0.01 if moving else 0.005
-    if closest_points(g_r, start, g_o, tip)[2] < CONTACT + room:
+    moving = kind == "moving"
+    room, from_g_r = (0.01, 0.03) if moving else (0.005, _FROM_G_R)
+    if not _stands_well(g_r, g_o, tip, start, room, from_g_r):
         return None
-    from_g_r = 0.03 if moving else 0.0265
-    if closest_on_segment(g_r, g_o, tip)[1] < from_g_r:
+    if moving:
+        legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
+        return Scene(g_r, start, goal, g_o, legs) if legs else None
+    if closest_points(g_r, goal, g_o, tip).distance < _FREE:
         return None
-    if not moving:
-        if closest_points(g_r, goal, g_o, tip)[2] < CONTACT + 0.003:
-            return None
-        return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
-    legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
-    return Scene(g_r, start, goal, g_o, legs) if legs else None
+    return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
 
 
-def draw_fulcrum(rng: np.random.Generator, dome: float) -> Vector:
+def _draw_blocked(rng: np.random.Generator) -> Scene | None:
+    """One try; None if it breaks a rule."""
+    dome = rng.uniform(0.1, 0.12)
+    g_r, g_o = _draw_fulcrum(rng, dome), _draw_fulcrum(rng, dome)
+    if norm(sub(g_r, g_o)) < 0.06:
+        return None
+    start, goal = _draw_tip(rng, dome, g_r), _draw_tip(rng, dome, g_r)
+    if norm(sub(goal, start)) < 0.03:
+        return None
+    for _ in range(_FEW_TRIES):
+        tip = _draw_tip(rng, dome, g_o)
+        rho = closest_points(g_r, goal, g_o, tip).distance
+        if rho < _BLOCKED and _stands_well(g_r, g_o, tip, start):
+            break
+    else:
+        return None
+    for _ in range(_FEW_TRIES):
+        away = _draw_tip(rng, dome, g_o)
+        leg = Leg(_BLOCKED_TIME, tip, away, _LEAVING_SPEED)
+        clear = closest_points(g_r, goal, g_o, away).distance >= _BLOCKED + 0.004
+        between = [leg.at(_BLOCKED_TIME + 0.1 * k)[0] for k in range(50)]
+        if clear and all(_far_from(g_r, g_o, p, 0.03) for p in between):
+            stand = Leg(0.0, tip, tip, _LEAVING_SPEED)
+            return Scene(g_r, start, goal, g_o, [stand, leg])
+    return None
+
+
+def _draw_crowded(rng: np.random.Generator, seed: int, number: int) -> Scene:
+    """A standing scene with one or two more tools."""
+    more = 1 + number % 2
+    k = number
+    while True:
+        base = scene("standing", seed + 1000, k)
+        k += 100_000
+        others: list[tuple[Vector, Vector]] = []
+        dome = norm(base.p_WGr)
+        for _ in range(_FEW_TRIES):
+            g = _draw_fulcrum(rng, dome)
+            tip = _draw_tip(rng, dome, g)
+            taken = [base.p_WGr, base.p_WGo, *(other[1] for other in others)]
+            if any(norm(sub(g, one)) < 0.04 for one in taken):
+                continue
+            free = closest_points(base.p_WGr, base.p_WPs, g, tip).distance >= _FREE
+            if free and _stands_well(base.p_WGr, g, tip, base.p_WPr):
+                others.append((tip, g))
+            if len(others) == more:
+                return replace(base, others=tuple(others))
+
+
+def _far_from(g_r: Vector, g_o: Vector, tip: Vector, distance: float) -> bool:
+    return closest_on_segment(g_r, g_o, tip)[1] >= distance
+
+
+def _stands_well(
+    g_r: Vector,
+    g_o: Vector,
+    tip: Vector,
+    pose: Vector,
+    room: float = 0.005,
+    from_g_r: float = _FROM_G_R,
+) -> bool:
+    """Whether a tool is clear of R's pose and of its fulcrum."""
+    clear = closest_points(g_r, pose, g_o, tip).distance >= CONTACT + room
+    return clear and _far_from(g_r, g_o, tip, from_g_r)
+
+
+def _draw_fulcrum(rng: np.random.Generator, dome: float) -> Vector:
     """A point on the dome, even over the cap of 65 degrees."""
     z = rng.uniform(cos(65.0 * pi / 180.0), 1.0)
     azimuth = rng.uniform(0.0, 2.0 * pi)
@@ -188,7 +267,7 @@ def draw_fulcrum(rng: np.random.Generator, dome: float) -> Vector:
     return dome * r * cos(azimuth), dome * r * sin(azimuth), dome * z
 
 
-def draw_tip(rng: np.random.Generator, dome: float, p_WG: Sequence[float]) -> Vector:
+def _draw_tip(rng: np.random.Generator, dome: float, p_WG: Sequence[float]) -> Vector:
     """A point inside, even in volume, 80 to 160 mm from its fulcrum."""
     while True:
         x, y = rng.uniform(-dome, dome, 2)
@@ -216,17 +295,16 @@ def _wander(
     time = 0.0
     for _ in range(_TRIES):
         p0 = legs[-1].p1 if legs else tip
-        leg = Leg(time, p0, draw_tip(rng, dome, g_o), speed)
+        leg = Leg(time, p0, _draw_tip(rng, dome, g_o), speed)
         last = leg.end >= _WANDER_TIME
         if last:
             leg = leg.shortened(_WANDER_TIME)
-        if any(
-            closest_on_segment(g_r, g_o, along(p0, k / 20, sub(leg.p1, p0)))[1]
-            < from_g_r
-            for k in range(21)
+        way = sub(leg.p1, p0)
+        if not all(
+            _far_from(g_r, g_o, along(p0, k / 20, way), from_g_r) for k in range(21)
         ):
             continue
-        if last and closest_points(g_r, goal, g_o, leg.p1)[2] < CONTACT + 0.003:
+        if last and closest_points(g_r, goal, g_o, leg.p1).distance < _FREE:
             continue
         legs.append(leg)
         time = leg.end

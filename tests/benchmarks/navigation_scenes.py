@@ -14,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from plants.crowd.orca import orca_towards
+from plants.crowd.signals import Obstacle
 
 Frame = list[tuple[float, float, float, float, float]]
 """x, y [m], radius [m], v_x, v_y [m/s] of every obstacle at one instant."""
@@ -300,17 +301,17 @@ class _Crowd:
     def __init__(self, case: int, n: int) -> None:
         people = _humans(case, n) or []
         self._goals = [(p[2], p[3]) for p in people]
-        self._agents = [(p[0], p[1], 0.0, 0.0, 0.3) for p in people]
+        self._agents = [Obstacle(p[0], p[1], 0.3, 0.0, 0.0) for p in people]
         self._frames: list[Frame] = []
 
     def __call__(self, k: int) -> Frame:
         while len(self._frames) <= k:
             agents = self._agents
-            self._frames.append([(x, y, r, u, v) for x, y, u, v, r in agents])
+            self._frames.append(agents)
             moves = orca_towards(agents, self._goals, 1.0, 5.0, 0.25)
             self._agents = [
-                (x + 0.25 * u, y + 0.25 * v, u, v, r)
-                for (x, y, _, _, r), (u, v) in zip(agents, moves, strict=True)
+                Obstacle(x + 0.25 * u, y + 0.25 * v, r, u, v)
+                for (x, y, r, _, _), (u, v) in zip(agents, moves, strict=True)
             ]
         return self._frames[k]
 

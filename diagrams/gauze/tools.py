@@ -1,0 +1,106 @@
+"""The tools in the patient besides the robot's: a list, each with a name and a role.
+
+A file and `--set` reach a tool by its name: `obstacle.points=...`. The list has a
+target, an obstacle and a camera of these names; a file's `tools` adds others.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from diagrams.common.scenario import ScenarioError
+from plants.surgeon.hunting_tool import Hunt
+from plants.surgeon.surgeon_tool import SurgeonToolParams
+from systems.common.parameter import parameter, part
+from systems.motion.endoscope import EndoscopeParams
+
+TARGET, OBSTACLE, CAMERA = ROLES = ("target", "obstacle", "camera")
+SHORT = {"recording": "recording", "hunt": "hunt"}
+"""Keys of the tool called obstacle that need not name it."""
+APART = 1 << 40
+"""Seeds of a third tool's tremor and so on lie this far from those of the first two."""
+
+
+@dataclass
+class HandTool(SurgeonToolParams):
+    """A tool in the surgeon's hand: the target S, or an obstacle O."""
+
+    name: str = parameter("", "by which keys, log and figures go")
+    role: str = parameter(OBSTACLE, "what it is to the robot", choices=ROLES[:2])
+    hunt: Hunt = part(Hunt)
+
+
+@dataclass
+class CameraTool(EndoscopeParams):
+    """The endoscope."""
+
+    name: str = parameter("", "by which keys, log and figures go")
+    role: str = parameter(CAMERA, "what it is to the robot", choices=ROLES[2:])
+
+
+type Tool = HandTool | CameraTool
+
+
+def usual_tools() -> list[Tool]:
+    """A target, an obstacle and a camera."""
+    return [
+        HandTool(name=TARGET, role=TARGET),
+        HandTool(name=OBSTACLE),
+        CameraTool(name=CAMERA),
+    ]
+
+
+def gather(tree: dict[str, Any]) -> None:
+    """Brings what a scenario's plain data say of tools into the one list `tools`.
+
+    Raises:
+        ScenarioError: If a tool has no name, or what stands for one has no keys.
+    """
+    found: dict[str, Any] = {name: {"role": name} for name in ROLES}
+    items = tree.pop("tools", [])
+    for index, item in enumerate(items if isinstance(items, list) else [items]):
+        if not isinstance(item, dict) or not item.get("name"):
+            raise ScenarioError(f"tools[{index}]={item!r}: expected keys, with a name")
+        found.setdefault(item["name"], {}).update(item)
+    for key in SHORT.keys() & tree.keys():
+        tree.setdefault(OBSTACLE, {})[SHORT[key]] = tree.pop(key)
+    for name in found.keys() & tree.keys():
+        told = tree.pop(name)
+        if not isinstance(told, dict):
+            raise ScenarioError(f"{name}={told!r}: expected keys and values")
+        for key, value in told.items():
+            old = found[name].get(key)
+            both = isinstance(old, dict) and isinstance(value, dict)
+            found[name][key] = old | value if both else value
+    tree["tools"] = [{"name": name, **tool} for name, tool in found.items()]
+
+
+def hands(tools: list[Tool], seed: int) -> dict[str, HandTool]:
+    """The surgeon's tools by name, the target first, each with a tremor of its own."""
+    held = sorted(
+        (tool for tool in tools if isinstance(tool, HandTool)),
+        key=lambda tool: tool.role != TARGET,
+    )
+    return {
+        tool.name: replace(tool, tremor_seed=2 * seed + k % 2 + k // 2 * APART)
+        for k, tool in enumerate(held)
+    }
+
+
+def logged(run: Any, tool: Tool) -> Any:
+    """What was logged of a tool: `shaft`, `estimate`, and so on."""
+    return getattr(run, tool.name)
+
+
+def in_the_way(tools: list[Tool]) -> list[tuple[str, str]]:
+    """Name and role of every tool, as clearances have them: obstacles come first."""
+    order = (OBSTACLE, TARGET, CAMERA)
+    return [(t.name, t.role) for role in order for t in tools if t.role == role]
+
+
+def gap(run: Any, role: str) -> np.ndarray:
+    """The least true clearance to the tools of a role over time (n) [m]."""
+    roles = [role for _, role in in_the_way(run.scenario.tools)]
+    near: np.ndarray = run.clearance.distance[:, np.array(roles) == role].min(axis=1)
+    return near

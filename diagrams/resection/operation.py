@@ -1,0 +1,178 @@
+"""A resection's case: what is planned, reachable and done before anything moves."""
+
+from dataclasses import dataclass, field, replace
+import math
+from pathlib import Path
+import sys
+from time import perf_counter
+from typing import Any
+
+from diagrams.common.case import Case
+from diagrams.common.progress import Progress
+from diagrams.common.scenario import ScenarioError
+from diagrams.resection.scenario import ResectionScenario
+from plants.tissue.execution import Execution, load_execution
+from plants.tissue.mask import load_mask
+from plants.tissue.space import NEIGHBOUR
+from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
+from plants.tissue.volume import Access, make_volume
+from systems.common.archive import beside
+from systems.resection.planning.access import propose_access
+from systems.resection.planning.planner import Planner
+from systems.resection.planning.reach import Reach, find_reach, load_reach, save_reach
+from systems.resection.planning.session import Session, load_session
+from systems.resection.wires.procedure_player import schedule
+
+LOG_PERIOD = 0.1
+"""Of a resection's signals, in s; runs last a multiple of it."""
+
+
+@dataclass(kw_only=True)
+class Operation(Case):
+    """A resection's case.
+
+    Attributes:
+        session: The plan.
+        tumour: Its name.
+        reach: The reachable part; None if nothing was planned.
+        refusals: What was refused: procedure, reason, where [m], gap [m].
+        planning_time: Of the procedures' checks and the planner, in s.
+        done: What earlier runs carried out of the plan.
+    """
+
+    session: Session
+    tumour: str
+    reach: Reach | None = None
+    refusals: list[dict[str, Any]] = field(default_factory=list)
+    planning_time: float = 0.0
+    done: Execution = field(default_factory=Execution)
+
+
+def tissue_of(scenario: ResectionScenario) -> Tissue:
+    """The tissue before the operation."""
+    if scenario.mask:
+        return load_mask(scenario.mask, scenario.labels)
+    return synthetic_tumour(scenario.tumour)
+
+
+def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
+    """A session at its beginning, and the tumour's name."""
+    tissue = tissue_of(scenario)
+    access = scenario.access
+    if access.direction is None:
+        access = propose_access(tissue, access, scenario.snake).access
+    volume = make_volume(
+        tissue,
+        access,
+        scenario.snake.body_radius,
+        scenario.spacing,
+        # A ball whose voxels keep a distance may stand out of them by half a diagonal.
+        scenario.margin + scenario.tracking + NEIGHBOUR * scenario.spacing,
+    )
+    for note in [*tissue.notes, *volume.notes]:
+        print(f"trocar: {tissue.name}: {note}", file=sys.stderr)
+    session = Session(volume, scenario.snake, scenario.clearance, scenario.accuracy)
+    return session, tissue.name
+
+
+def outline(scenario: ResectionScenario) -> Operation:
+    """An operation of which nothing is planned, on a tumour that is quickly made."""
+    access = Access(direction=[0.0, 0.0, -1.0])
+    session, tumour = new_session(
+        replace(
+            scenario, mask="", tumour=SyntheticTumour(), access=access, spacing=2e-3
+        )
+    )
+    return Operation(scenario, session=session, tumour=tumour)
+
+
+def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
+    """Plans a scenario, or goes on with the plan in its session's file.
+
+    Raises:
+        ValueError: If tumour, access or session's files make no sense.
+    """
+    file = Path(scenario.session) if scenario.session else None
+    session, tumour = new_session(scenario)
+    if file is not None and file.is_file():
+        fresh, session = session, load_session(file)
+        if session.volume.labels.shape != fresh.volume.labels.shape or (
+            (session.volume.labels != fresh.volume.labels).any()
+        ):
+            raise ScenarioError(f"session {str(file)!r} is of another tumour or access")
+    session.file = file
+    reach = reach_of(session, scenario, progress)
+    start = perf_counter()
+    refusals = []
+    for number, procedure in enumerate(scenario.procedures):
+        if any(step.procedure == procedure for step in session.steps):
+            continue  # resumed: it is done
+        answer = session.commit(procedure)
+        if not answer.feasible:
+            refusals.append(
+                {
+                    "procedure": procedure.name or f"{number + 1}: {procedure.kind}",
+                    "reason": answer.reason,
+                    "where": answer.where,
+                    "gap": answer.gap,
+                    "text": answer.text,
+                }
+            )
+    if scenario.automatic:
+        finish_plan(session, reach, scenario, progress)
+    elif session.steps and session.steps[-1].kind != "home":
+        session.go_home()
+    planning_time = perf_counter() - start
+    done = Execution()
+    if file is not None:
+        done = load_execution(beside(file, "executed"), session.postures)
+    return Operation(
+        scenario,
+        session=session,
+        tumour=tumour,
+        reach=reach,
+        refusals=refusals,
+        planning_time=planning_time,
+        done=done,
+    )
+
+
+def reach_of(
+    session: Session, scenario: ResectionScenario, progress: Progress
+) -> Reach:
+    """The reachable part, from beside the session's file if it was found before."""
+    file, seed, effort = session.file, scenario.seed, scenario.reach_effort
+    if file is not None:
+        saved = load_reach(beside(file, "reach"), session, seed, effort)
+        if saved is not None:
+            return saved
+    with progress("what can be reached", "of the tumour") as show:
+        reach = find_reach(
+            session, seed, effort, progress=lambda share: show(share, 1.0)
+        )
+    if file is not None:
+        save_reach(beside(file, "reach"), reach, session, seed, effort)
+    return reach
+
+
+def finish_plan(
+    session: Session, reach: Reach, scenario: ResectionScenario, progress: Progress
+) -> None:
+    """Lets the planner do what is left."""
+    target = scenario.planner.target
+    with progress("planning", "of what can be reached") as show:
+        planner = Planner(
+            session,
+            reach.mask,
+            scenario.planner,
+            lambda share: show(min(share, target), target),
+        )
+        planner.run()
+
+
+def length(case: Operation) -> float:
+    """How long the run takes in s."""
+    player = replace(case.scenario.player, lead=case.scenario.period)
+    times = schedule(case.session.postures[case.done.posture :], player)
+    needed = float(times[-1]) + player.dwell
+    return min(case.scenario.duration, math.ceil(needed / LOG_PERIOD) * LOG_PERIOD)

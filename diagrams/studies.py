@@ -1,0 +1,108 @@
+"""The systems that scenarios can run, and scenarios loaded by their names."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from diagrams.common.case import Case
+from diagrams.common.scenario import (
+    ScenarioError,
+    find_scenario,
+    nearest,
+    refusals,
+)
+from diagrams.common.study import Study
+from diagrams.common.tree import (
+    apply_override,
+    fit,
+    make,
+    read_tree,
+    require,
+    settle,
+)
+from diagrams.gauze.study import STUDY as GAUZE
+from diagrams.navigation.study import STUDY as NAVIGATION
+from diagrams.resection.study import STUDY as RESECTION
+from diagrams.snake.study import STUDY as SNAKE
+from diagrams.wrist.study import STUDY as WRIST
+from systems.common.parameter import check
+
+STUDIES = {study.name: study for study in (GAUZE, NAVIGATION, WRIST, SNAKE, RESECTION)}
+"""A scenario's `system` and the study that runs it."""
+
+
+def get_study(name: Any) -> Study:
+    """The study of a name.
+
+    Raises:
+        ScenarioError: If there is none; the nearest name is in the message.
+    """
+    if name not in STUDIES:
+        raise ScenarioError(f"system={name!r}: {nearest(str(name), STUDIES)}")
+    return STUDIES[name]
+
+
+def load_scenario(
+    name: str,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    duration: float | None = None,
+) -> Any:
+    """Loads a scenario by name or file, with overrides, and checks it.
+
+    Args:
+        name: A scenario's name (see `scenario_files`) or the path of a file.
+        overrides: `KEY.SUB=VALUE` texts, applied in order.
+        seed: Replaces the scenario's seed.
+        duration: Replaces the scenario's duration [s].
+
+    Returns:
+        The study's own scenario dataclass.
+
+    Raises:
+        ScenarioError: For anything that can be known to be wrong beforehand.
+    """
+    path = find_scenario(name)
+    tree = read_tree(path)
+    if "system" not in tree:
+        raise ScenarioError(f"{path}: missing key 'system', e.g. 'system: gauze'")
+    study = get_study(tree["system"])
+    schema = study.scenario
+    study.gather(tree)
+    settle(schema, tree, path.parent)
+    for text in overrides:
+        apply_override(tree, text)
+    if seed is not None:
+        tree["seed"] = seed
+    if duration is not None:
+        tree["duration"] = duration
+    study.gather(tree)
+    settle(schema, tree, Path.cwd())
+    for key in study.required:
+        require(tree, key, path)
+    scenario = make(schema, fit(schema, tree))
+    check_scenario(scenario)
+    return scenario
+
+
+def check_scenario(scenario: Any) -> None:
+    """Holds every value against its declaration, then the study's rules."""
+    with refusals():
+        check(scenario, "")
+        get_study(scenario.system).check(scenario)
+
+
+def build(case: Any) -> Any:
+    """Makes a diagram.
+
+    Args:
+        case: A case; or a scenario, which then is not prepared: a plan is empty.
+
+    Raises:
+        ScenarioError: If a block or a plant refuses one of its parameters.
+    """
+    with refusals():
+        if isinstance(case, Case):
+            return get_study(case.scenario.system).make_diagram(case)
+        study = get_study(case.system)
+        return study.make_diagram(study.outline(case))

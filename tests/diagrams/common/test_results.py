@@ -1,0 +1,116 @@
+"""What a run leaves: whole files, of one run, whatever breaks."""
+
+from dataclasses import replace
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from diagrams.common.cli import main
+from diagrams.common.log import first_fault
+from diagrams.common.replay import MOST_FRAMES, thinned
+from diagrams.common.results import LOCK, results
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import STUDIES, build, load_scenario
+from systems.common import step_block
+from systems.common.archive import whole
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from diagrams.common.results import results
+with results(Path(sys.argv[1])):
+    print("locked", flush=True)
+    time.sleep(60)
+"""
+
+
+def names(folder):
+    """What is in a folder."""
+    return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*.*"))
+
+
+def test_a_file_is_whole_or_not_there(tmp_path):
+    path = tmp_path / "signals.csv"
+    path.write_text("old")
+    with pytest.raises(OSError, match="disk is full"), whole(path) as draft:
+        draft.write_text("ne")
+        raise OSError("the disk is full")
+    assert path.read_text() == "old"
+    with whole(path) as draft:
+        draft.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert names(tmp_path) == ["signals.csv"]
+
+
+def test_a_second_run_is_kept_out_until_the_first_is_dead(tmp_path):
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    )
+    assert holder.stdout.readline() == "locked\n"
+    with pytest.raises(ScenarioError, match="another run writes to"):
+        results(tmp_path).__enter__()
+    holder.kill()
+    holder.communicate()
+    with results(tmp_path) as into, into.file("metrics.json") as draft:
+        draft.write_text("{}")
+    assert (tmp_path / "metrics.json").read_text() == "{}"
+
+
+def test_what_an_earlier_run_left_goes_and_nothing_else(tmp_path):
+    stranger = tmp_path.parent / "stranger.png"
+    for path in (stranger, tmp_path / "mine.png", tmp_path / "metrics.json"):
+        path.write_text("")
+    with results(tmp_path) as into:
+        for name in ("inputs/a.csv", "inputs/b.csv", "speeds.png"):
+            with into.file(name) as draft:
+                draft.write_text(name)
+    with (tmp_path / LOCK).open("a") as stream:
+        stream.write("../stranger.png\n\n")
+    with results(tmp_path) as into:
+        into.clear({(tmp_path / "inputs/b.csv").resolve()})
+    assert names(tmp_path) == [LOCK, "inputs/b.csv", "mine.png"]
+    assert stranger.exists()
+
+
+@pytest.mark.parametrize("what", ["measure", "plots"])
+def test_the_log_outlives_what_is_made_of_it(what, tmp_path, monkeypatch, capsys):
+    def broken(run):
+        raise ZeroDivisionError("of nothing")
+
+    monkeypatch.setitem(STUDIES, "gauze", replace(STUDIES["gauze"], **{what: broken}))
+    arguments = ["--duration", "0.2", "--no-replay", "--out", str(tmp_path)]
+    assert main(["run", "gauze_static", *arguments]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1].startswith("trocar: the run failed: ")
+    assert lines[-1].endswith("ZeroDivisionError: of nothing")
+    log = np.genfromtxt(tmp_path / "signals.csv", delimiter=",", names=True)
+    assert log["time"][-1] == pytest.approx(0.2)
+    assert json.loads((tmp_path / "metrics.json").read_text())["duration"] == 0.2
+
+
+def test_a_signal_that_is_no_number_is_named():
+    time = np.array([0.0, 0.5, 1.0])
+    one, two = np.array([0.0, 0.0, np.nan]), np.array([0.0, np.inf, np.nan])
+    assert first_fault({"time": time, "one": time}) == ""
+    found = first_fault({"time": time, "one": one, "two": two})
+    assert found == "signal 'two' is inf at 0.500 s"
+
+
+def test_a_second_diagram_compiles_nothing(monkeypatch):
+    scenario = load_scenario("gauze_static")
+    build(scenario)
+
+    def refused(*arguments):
+        raise AssertionError("compiled code is never freed")
+
+    monkeypatch.setattr(step_block, "generated", refused)
+    assert build(scenario).num_output_ports() > 0
+
+
+def test_a_long_replay_is_thinned():
+    assert thinned(30 * 120) == 1
+    assert 30 * 600 / thinned(30 * 600) <= MOST_FRAMES
