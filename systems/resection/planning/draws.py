@@ -64,10 +64,11 @@ def uniform(d: Draws) -> float:
 @compiled
 def below(d: Draws, n: int) -> int:
     """One of the whole numbers 0 to n - 1."""
-    mask = 1
+    if n < 2:
+        return 0
+    mask, drawn = 1, n
     while mask < n:
         mask *= 2
-    drawn = 0 if n == 1 else n
     while drawn >= n:
         drawn = _word(d) & (mask - 1)
     return drawn

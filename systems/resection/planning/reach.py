@@ -40,6 +40,9 @@ WEARY = 2000
 ROOMY = 40.0e-6
 """A smaller tumour, in m3, is searched longer, up to four times."""
 
+LEAST_LUMP = 2e-9
+"""Volume in m3 of the smallest part that is told."""
+
 STALL = 0.001
 """A search whose last rounds gain less of the tumour than this has ended."""
 
@@ -174,24 +177,24 @@ def _lumps(
 ) -> list[Lump]:
     """What stays, part by part, with reasons."""
     stays = (volume.labels == TUMOUR) & (volume.tau == SOLID)
-    parts, count = ndimage.label(stays, np.ones((3, 3, 3)))
-    if count == 0:
-        return []
-    sizes = np.bincount(parts.ravel(), minlength=count + 1)
-    boxes = ndimage.find_objects(parts)
-    found = []
-    order = np.argsort(-sizes[1:], kind="stable")
-    for n in order:
-        box = boxes[n]
-        mask = parts[box] == n + 1
-        corner = np.array([side.start for side in box])
-        points = volume.origin + volume.spacing * (np.argwhere(mask) + corner)
-        if sizes[n + 1] * volume.voxel < 2e-9:
-            break
-        reason = _reason(session, volume, points, mask, box, opening, draws)
-        centre = points.mean(axis=0).tolist()
-        found.append(Lump(float(sizes[n + 1]) * volume.voxel, centre, reason))
-    return found
+    parts, _ = ndimage.label(stays, np.ones((3, 3, 3)))
+    places = []
+    for number, box in enumerate(ndimage.find_objects(parts), 1):
+        mask = parts[box] == number
+        if np.count_nonzero(mask) * volume.voxel >= LEAST_LUMP:
+            corner = np.array([side.start for side in box])
+            points = volume.origin + volume.spacing * (np.argwhere(mask) + corner)
+            places.append((points, mask, box))
+    # Of two of a size the one nearer to the channel's mouth comes first.
+    places.sort(key=lambda place: (-len(place[0]), np.linalg.norm(place[0].mean(0))))
+    return [
+        Lump(
+            len(points) * volume.voxel,
+            points.mean(axis=0).tolist(),
+            _reason(session, volume, points, mask, box, opening, draws),
+        )
+        for points, mask, box in places
+    ]
 
 
 def _reason(
