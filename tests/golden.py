@@ -22,14 +22,17 @@ WALL = {
 
 
 def golden() -> dict[str, dict[str, Any]]:
-    """The table: the figures of every scenario that is shipped with what it needs."""
+    """The table: the figures of every scenario that is shipped with what it needs.
+
+    A row's key is the scenario's name, and overrides after it.
+    """
     table: dict[str, dict[str, Any]] = json.loads(TABLE.read_text())
     return table
 
 
-def figures(name: str) -> dict[str, Any]:
-    """What a scenario measures now, as the table has it."""
-    metrics = {k: v for k, v in run(name).metrics.items() if k not in WALL}
+def figures(row: str) -> dict[str, Any]:
+    """What the scenario of a row measures now, as the table has it."""
+    metrics = {k: v for k, v in run(*row.split()).metrics.items() if k not in WALL}
     kept: dict[str, Any] = json.loads(json.dumps(metrics))
     return kept
 

@@ -14,7 +14,7 @@ from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
 from plants.tissue.tissue_carver import Carving, TissueCarver
 from systems.resection.wires.procedure_player import ProcedurePlayer
-from systems.resection.wires.resection_ik import ResectionIk, from_universal
+from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.wire_drums import WireDrums
 from systems.resection.wires.wire_forward_actuation import WireForwardActuation
@@ -37,7 +37,7 @@ EXPORTS = {
     "tip.reference": "procedure_player.reference",
     "plan.progress": "procedure_player.progress",
     "snake.tool": "snake_location.tool",
-    "snake.posture": "snake_location.posture",
+    "snake.posture": "snake_location.bends",
     "ik.status": "resection_ik.status",
     "drums.limited": "wire_drums.limited",
     "wires.tension": "wire_tension.tension",
@@ -53,8 +53,9 @@ EXPORTS = {
 def make_blocks(case: Operation) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, postures, done = case.scenario, case.session.postures, case.done
-    start = from_universal(postures[done.posture].tolist())
-    lengths = wound_lengths(start, s.inverse_actuation, s.snake, s.drive)
+    start = postures[done.posture].tolist()
+    winding = replace(s.inverse_actuation, period=s.period)
+    lengths = wound_lengths(start, winding, s.snake, s.drive)
     return {
         "procedure_player": ProcedurePlayer(
             replace(s.player, lead=s.period), s.snake, postures, done.posture
@@ -63,10 +64,12 @@ def make_blocks(case: Operation) -> dict[str, Any]:
             replace(s.resection_ik, period=s.period), s.snake, start
         ),
         "wire_inverse_actuation": WireInverseActuation(
-            s.inverse_actuation, s.snake, s.drive
+            winding, s.snake, s.drive, start
         ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "wire_forward_actuation": WireForwardActuation(
+            s.snake, s.drive, s.period, start
+        ),
         "snake_location": SnakeLocation(s.snake),
         "wire_watch": WireWatch(replace(s.watch, period=s.period)),
         "wire_tension": WireTension(s.tension, s.snake),

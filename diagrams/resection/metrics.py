@@ -28,10 +28,9 @@ def outside_depth(volume: Any) -> float:
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     session, reach = run.case.session, run.case.reach
-    removed = run.matrix("tissue.removed")[-1]
-    hits, nearest = run.matrix("tissue.touched")[-1]
-    tool, reference = run.matrix("snake.tool"), run.matrix("tip.reference")
-    error = np.linalg.norm(tool[:, :3] - reference[:, :3], axis=1)
+    removed, touched = run.tissue.removed, run.tissue.touched
+    nearest = float(touched.critical_distance[-1])
+    error = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
     volume = session.volume.tumour_volume
     steps = session.steps
     cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
@@ -41,18 +40,18 @@ def measure(run: Any) -> dict[str, Any]:
         "cap_volume": cap,
         "reachable_fraction": reach.fraction,
         "planned_fraction": session.fraction,
-        "resected_fraction": float(removed[0]) / volume,
-        "healthy_removed": float(removed[1]),
+        "resected_fraction": float(removed.tumour[-1]) / volume,
+        "healthy_removed": float(removed.healthy[-1]),
         "max_outside_depth": outside_depth(carving_of(run).volume),
-        "min_critical_distance": float(nearest) if nearest >= 0.0 else None,
-        "body_collisions": int(hits),
+        "min_critical_distance": nearest if nearest >= 0.0 else None,
+        "body_collisions": int(touched.hits[-1]),
         "procedures": sum(step.kind not in ("home", "finish") for step in steps),
         "finishes": sum(step.kind == "finish" for step in steps),
         "planning_time": run.case.planning_time,
         "reach_time": reach.time,
         "execution_time": run.case.done.time + run.simulated,
         "resumed_at": run.case.done.time,
-        "path_length": float(run.signals["tissue.way"][-1]),
+        "path_length": float(run.tissue.way.length[-1]),
         "max_tool_error": float(error.max()),
         "rms_tool_error": float(np.sqrt(np.mean(error**2))),
         "refusals": run.case.refusals,

@@ -146,7 +146,7 @@ def _timeline(axes: Any, run: Any) -> None:
     session = run.case.session
     before = run.case.done.time  # what an earlier run carried out
     time = before + run.signals["time"]
-    share = run.signals["tissue.removed.tumour"] / session.volume.tumour_volume
+    share = run.tissue.removed.tumour / session.volume.tumour_volume
     axes.plot(time / 60, 100 * share, color=COLORS["robot"], lw=1.6)
     reach = 100 * run.case.reach.fraction
     axes.axhline(reach, color=COLORS["target"], lw=1.0, ls="--")

@@ -35,7 +35,7 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The tumour in blocks whose visibility is animated, the vessel, Figure 7."""
     volume = run.case.session.volume
     tau, first = carving_of(run).volume.tau, run.case.done.index
-    moves = float(run.signals["tissue.index"][-1]) - first
+    moves = float(run.tissue.index.number[-1]) - first
     end = float(run.signals["time"][-1]) / run.replay_speed
     every = shown_spacing(volume)
     spacing = every * volume.spacing

@@ -17,25 +17,29 @@ from diagrams.resection.operation import (
 from diagrams.resection.plots import plots
 from diagrams.resection.replay import decorate
 from diagrams.resection.scenario import ResectionScenario, check
+from plants.snake.signals import ToolPose
 from plants.tissue.execution import save_execution
+from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
 from systems.common.archive import beside
+from systems.resection.wires.procedure_player import Progress
+from systems.resection.wires.resection_ik import IkStatus
+from systems.resection.wires.snake_location import Bends
+from systems.resection.wires.wire_drums import Limited
+from systems.resection.wires.wire_watch import Alarm
 
-XYZ = ("x", "y", "z")
-TOOL = (*XYZ, "n_x", "n_y", "n_z")
 SIGNALS = {
-    "tip.reference": TOOL,
-    "plan.progress": ("index",),
-    "snake.tool": TOOL,
-    "snake.posture": ("s", "alpha1", "beta1", "alpha2", "beta2", "alpha3", "beta3"),
-    "ik.status": ("code",),
-    "drums.limited": ("code",),
-    "tissue.index": ("index",),
-    "tissue.removed": ("tumour", "healthy"),
-    "tissue.touched": ("hits", "critical_distance"),
-    "tissue.way": ("length",),
-    "watch.alarm": ("time", "module"),
+    "tip.reference": ToolPose,
+    "plan.progress": Progress,
+    "snake.tool": ToolPose,
+    "snake.posture": Bends,
+    "ik.status": IkStatus,
+    "drums.limited": Limited,
+    "tissue.index": Moves,
+    "tissue.removed": Removed,
+    "tissue.touched": Touched,
+    "tissue.way": Way,
+    "watch.alarm": Alarm,
 }
-
 
 SAVE_EVERY = 5.0
 """Least wall time in s between two savings of what has been carried out."""
@@ -50,10 +54,10 @@ def keep(case: Operation, station: Any, context: Any, ended: bool) -> None:
         return
     player = station.GetSubsystemByName("procedure_player")
     carver = station.GetSubsystemByName("tissue_carver")
-    posture = player.GetOutputPort("progress").Eval(
+    (posture,) = player.GetOutputPort("progress").Eval(
         player.GetMyContextFromRoot(context)
     )
-    done = carver.execution(carver.GetMyContextFromRoot(context), int(posture[0]))
+    done = carver.execution(carver.GetMyContextFromRoot(context), int(posture))
     save_execution(file, done, case.session.postures)
 
 
@@ -63,7 +67,7 @@ STUDY = Study(
     make_diagram=make_resection_diagram,
     check=check,
     measure=measure,
-    signals=SIGNALS,
+    signals=lambda scenario: SIGNALS,
     log_period=LOG_PERIOD,
     plots=plots,
     decorate=decorate,

@@ -13,7 +13,6 @@ from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
 from systems.resection.planning.feasibility_map import FeasibilityMap
 from systems.resection.planning.session import Session
-from systems.resection.wires.resection_ik import from_universal
 
 FEASIBLE = np.array([0.15, 0.62, 0.30])
 BLOCKED = np.array([0.80, 0.22, 0.18])
@@ -49,8 +48,7 @@ def show_session(
         colors = np.where(found.feasible[nearest, None], FEASIBLE, BLOCKED)
         colors = np.where((away > 2.5e-3)[:, None], UNKNOWN, colors)
         meshcat.SetTriangleColorMesh("tumour", vertices.T, faces.T, colors.T)
-    q = np.array(from_universal(session.postures[-1].tolist()))
-    show_snake(meshcat, q, session.params)
+    show_snake(meshcat, session.postures[-1], session.params)
     tips = session.tips
     if len(tips) > 1:
         meshcat.SetLine("trail", tips.T, 1.0, Rgba(0.12, 0.37, 0.85, 0.6))

@@ -13,7 +13,7 @@ from plants.snake.elastic_wires import ElasticWires
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
-from systems.resection.wires.resection_ik import ResectionIk, universal
+from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tip_reference import TipReference, reference
 from systems.resection.wires.wire_drums import WireDrums
@@ -59,7 +59,7 @@ ELASTIC_WIRES = (
 EXPORTS = {
     "tip.reference": "tip_reference.reference",
     "snake.tool": "snake_location.tool",
-    "snake.posture": "snake_location.posture",
+    "snake.posture": "snake_location.bends",
     "snake.coupler_error": "snake_location.coupler_error",
     "ik.status": "resection_ik.status",
     "drums.lengths": "wire_drums.lengths",
@@ -75,8 +75,7 @@ CHANNEL_CLEARANCE = 1.0e-3
 
 def start_posture(scenario: SnakeScenario) -> list[float]:
     """The posture (7) that the tip's reference begins with."""
-    v = reference(scenario.tip, 0.0)
-    return tool_postures(v[:3], v[3:6], v[6:], scenario.snake).q.tolist()
+    return tool_postures(*reference(scenario.tip, 0.0), scenario.snake).x.tolist()
 
 
 def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
@@ -84,7 +83,7 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
     s = scenario
     elastic = s.wires == "elastic"
     posture = start_posture(s)
-    winding = s.inverse_actuation
+    winding = replace(s.inverse_actuation, period=s.period)
     if elastic:
         winding = replace(winding, stiffness=s.drive.wire_stiffness)
     lengths = wound_lengths(posture, winding, s.snake, s.drive)
@@ -93,9 +92,13 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, posture
         ),
-        "wire_inverse_actuation": WireInverseActuation(winding, s.snake, s.drive),
+        "wire_inverse_actuation": WireInverseActuation(
+            winding, s.snake, s.drive, posture
+        ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(s.snake, s.drive, s.period),
+        "wire_forward_actuation": WireForwardActuation(
+            s.snake, s.drive, s.period, posture
+        ),
         "snake_location": SnakeLocation(s.snake),
         "wire_watch": WireWatch(replace(s.watch, period=s.period)),
     }
@@ -132,7 +135,7 @@ def make_snake_diagram(
     channel = scenario.snake.body_radius + CHANNEL_CLEARANCE
     draw_channel(plant, plant.world_body(), channel)
     plant.Finalize()
-    set_default_posture(plant, snake, universal(start_posture(scenario)))
+    set_default_posture(plant, snake, start_posture(scenario))
     blocks = add_blocks(builder, make_blocks(scenario), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
     wires = WIRES + (ELASTIC_WIRES if elastic else DRUM_WIRES)

@@ -11,6 +11,7 @@ from diagrams.snake.plots import MM, MODULE_COLORS
 from plants.snake.actuation import length_range, wire_lengths
 from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import WIRES, SnakeParams
+from plants.snake.posture import posture_of
 from plants.snake.wire_path import hanging_points, tangent_points
 from systems.common.parameter import check
 
@@ -47,12 +48,12 @@ def draw_module(axes: Any, alpha: float, beta: float, params: SnakeParams) -> No
         beta: Bend of each ball in rad.
         params: The snake.
     """
-    q = np.array([0.0, alpha, beta, 0.0, 0.0, 0.0, 0.0])
+    x = posture_of([0.0, alpha, beta, 0.0, 0.0, 0.0, 0.0])
     R, d, r = params.ball_radius, params.face, params.body_radius
     sb = np.sin(beta)
     middle = np.array([np.cos(alpha) * sb, np.sin(alpha) * sb, np.cos(beta)])
-    axes_of = (np.array([0.0, 0.0, 1.0]), middle, frames(q, params)[1][:3, 2])
-    balls = hanging_points(q, params)[:2]
+    axes_of = (np.array([0.0, 0.0, 1.0]), middle, frames(x, params)[1][:3, 2])
+    balls = hanging_points(x, params)[:2]
     for w in range(WIRES):  # through the plate between the balls
         through = np.array([balls[0][2][w], balls[1][1][w]]) * MM
         axes.plot(*through.T, color=MODULE_COLORS[w], lw=2.5, alpha=0.5)
@@ -103,7 +104,7 @@ def module_figure(
     figure = new_figure(9.0, 4.4)
     draw_module(add_axes(figure, 1, 2, 1, projection="3d"), alpha, beta, params)
     axes = add_axes(figure, 1, 2, 2)
-    L = wire_lengths([0.0, alpha, beta, 0, 0, 0, 0], params)[:WIRES] * MM
+    L = wire_lengths(posture_of([0.0, alpha, beta, 0, 0, 0, 0]), params)[:WIRES] * MM
     low, high = (limit[:WIRES] * MM for limit in length_range(params))
     straight = params.straight_module * MM
     axes.barh(range(WIRES), high - low, left=low, color=COLORS["muted"], alpha=0.3)
@@ -134,7 +135,7 @@ def reach(
     for k in range(4 - modules, 4):
         q[:, 2 * k - 1] = rng.uniform(-np.pi, np.pi, count)
         q[:, 2 * k] = params.max_bend * np.sqrt(rng.uniform(0.0, 1.0, count))
-    p = forward(q, params)[:, :3, 3]
+    p = forward(posture_of(q), params)[:, :3, 3]
     return np.column_stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]])
 
 

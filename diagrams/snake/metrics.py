@@ -30,11 +30,11 @@ def judged(run: Any) -> np.ndarray:
 
 def errors(run: Any) -> tuple[np.ndarray, np.ndarray]:
     """Tip position [m] and tool axis [rad] against the reference, (n,) each."""
-    tool, reference = run.matrix("snake.tool"), run.matrix("tip.reference")
-    n_d = reference[:, 3:] / np.linalg.norm(reference[:, 3:], axis=1)[:, None]
-    sine = np.linalg.norm(np.cross(tool[:, 3:], n_d), axis=1)
-    angle = np.arctan2(sine, (tool[:, 3:] * n_d).sum(axis=1))
-    return np.linalg.norm(tool[:, :3] - reference[:, :3], axis=1), angle
+    tool, reference = run.snake.tool, run.tip.reference
+    n_d = reference.n / np.linalg.norm(reference.n, axis=1)[:, None]
+    sine = np.linalg.norm(np.cross(tool.n, n_d), axis=1)
+    angle = np.arctan2(sine, (tool.n * n_d).sum(axis=1))
+    return np.linalg.norm(tool.p - reference.p, axis=1), angle
 
 
 def measure(run: Any) -> dict[str, Any]:
@@ -44,8 +44,8 @@ def measure(run: Any) -> dict[str, Any]:
     position, angle = (error[flags] for error in errors(run))
     snapped = break_time(run.scenario)
     before = time < (np.inf if snapped is None else snapped)
-    tension = run.matrix("wires.tension")[before]
-    alarm = float(run.matrix("watch.alarm")[-1, 0])
+    tension = run.wires.tension.T[before]
+    alarm = float(run.watch.alarm.time[-1])
     false = alarm >= 0.0 and (snapped is None or alarm < snapped)
     found = alarm >= 0.0 and not false
     some = len(position) > 0
@@ -53,10 +53,10 @@ def measure(run: Any) -> dict[str, Any]:
         "max_pose_error": float(position.max()) if some else None,
         "rms_pose_error": float(np.sqrt(np.mean(position**2))) if some else None,
         "max_axis_error": float(angle.max()) if some else None,
-        "max_coupler_error": float(run.signals["snake.coupler_error"].max()),
+        "max_coupler_error": float(run.snake.coupler_error.angle.max()),
         "min_tension": float(tension.min()),
         "max_tension": float(tension.max()),
         "break_detection_time": alarm - snapped if found and snapped else None,
         "false_alarms": int(false),
-        "refused_poses": int(np.count_nonzero(np.diff(run.signals["ik.status"]) > 0)),
+        "refused_poses": int(np.count_nonzero(np.diff(run.ik.status.code) > 0)),
     }

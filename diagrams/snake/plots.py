@@ -10,6 +10,7 @@ from diagrams.snake.metrics import break_time, errors, judged
 from plants.snake.actuation import wire_lengths
 from plants.snake.kinematics import centreline
 from plants.snake.parameters import MODULES, WIRES
+from plants.snake.posture import posture_of
 
 MM = 1e3
 MODULE_COLORS = ("#d93329", "#1a8c47", "#2159cc")
@@ -19,7 +20,7 @@ STYLES = ("-", "--", ":")
 def _events(run: Any, *panels: Any) -> None:
     """Marks a snapping wire and the alarm."""
     snapped = break_time(run.scenario)
-    alarm = float(run.matrix("watch.alarm")[-1, 0])
+    alarm = float(run.watch.alarm.time[-1])
     for axes in panels:
         if snapped is not None:
             axes.axvline(snapped, color="k", lw=1.0, label="wire snaps")
@@ -32,16 +33,16 @@ def path(run: Any) -> Figure:
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
     time, tip = run.signals["time"], run.scenario.tip
-    q = run.matrix("snake.posture")
-    tool = run.matrix("snake.tool")[:, :3] * MM
-    reference = run.matrix("tip.reference")[:, :3] * MM
+    x = posture_of(run.snake.posture.q)
+    tool = run.snake.tool.p * MM
+    reference = run.tip.reference.p * MM
     if tip.poses:
         shown = (
             np.arange(tip.dwell, time[-1] + 1e-6, tip.dwell)[: len(tip.poses)] - 0.02
         )
     else:
         shown = tip.circle.ramp + tip.circle.period * np.arange(6) / 6
-    points = centreline(q, run.scenario.snake) * MM
+    points = centreline(x, run.scenario.snake) * MM
     for i in np.searchsorted(time, shown[shown <= time[-1]]):
         body = points[min(i, len(points) - 1)]
         axes.plot(*body.T, color=COLORS["robot"], lw=4, alpha=0.25)
@@ -86,8 +87,8 @@ def wires(run: Any) -> Figure:
     figure = new_figure(7.4, 5.6)
     time = run.signals["time"]
     straight = wire_lengths(np.zeros(7), run.scenario.snake)
-    change = (run.matrix("drums.lengths")[:, :9] - straight) * MM
-    tension = run.matrix("wires.tension")
+    change = (run.drums.lengths.wires - straight) * MM
+    tension = run.wires.tension.T
     upper = add_axes(figure, 2, 1, 1)
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     for w in range(WIRES * MODULES):
@@ -111,21 +112,22 @@ def break_closeup(run: Any) -> Figure:
     time, snapped = run.signals["time"], break_time(run.scenario) or 0.0
     near = (time > snapped - 0.2) & (time < snapped + 0.4)
     top = add_axes(figure, 3, 1, 1)
-    tension = run.matrix("wires.tension")[near]
+    tension = run.wires.tension.T[near]
     for w in range(WIRES * MODULES):
         style = {"color": MODULE_COLORS[w // WIRES], "ls": STYLES[w % WIRES]}
         top.plot(time[near], tension[:, w], lw=1.2, **style)
     top.axhline(run.scenario.watch.least, color=COLORS["muted"], lw=0.8)
     top.set(ylabel="tension [N]", ylim=(0, None))
     middle = add_axes(figure, 3, 1, 2, sharex=top)
-    residual = np.abs(run.matrix("wires.residual")[near])
+    residual = np.abs(run.wires.residual.modules[near])
     for m in range(MODULES):
         color, label = MODULE_COLORS[m], f"module {m + 1}"
         middle.semilogy(time[near], residual[:, m] + 1e-9, color=color, label=label)
     middle.set(ylabel="wires disagree")
     middle.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     bottom = add_axes(figure, 3, 1, 3, sharex=top)
-    rates = np.gradient(run.matrix("drums.lengths"), time, axis=0)[near]
+    drums = np.column_stack(run.drums.lengths)
+    rates = np.gradient(drums, time, axis=0)[near]
     bottom.plot(time[near], np.abs(rates).max(axis=1) * MM, color=COLORS["robot"])
     bottom.set(ylabel="fastest drum [mm/s]", xlabel="time [s]", ylim=(0, None))
     _events(run, top, middle, bottom)

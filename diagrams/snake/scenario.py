@@ -65,12 +65,12 @@ def _check_reach(scenario: SnakeScenario) -> None:
     """Every pose, and a whole turn of the circle, must be within reach."""
     tip = scenario.tip
     if tip.poses:
-        samples = [(f"tip.poses[{i}]", p.vector()) for i, p in enumerate(tip.poses)]
+        samples = [(f"tip.poses[{i}]", p.target()) for i, p in enumerate(tip.poses)]
     else:
         turn = tip.circle.period
         times = [tip.circle.ramp + turn * k / 72 for k in range(72)]
         samples = [("tip.circle", reference(tip, t)) for t in times]
-    for name, v in samples:
-        if not tool_postures(v[:3], v[3:6], v[6:], scenario.snake).reached:
-            reason = why_not(v[:3], v[3:6], v[6:], scenario.snake)
+    for name, target in samples:
+        if not tool_postures(*target, scenario.snake).reached:
+            reason = why_not(*target, scenario.snake)
             raise ScenarioError(f"{name}: {reason}")

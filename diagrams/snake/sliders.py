@@ -9,25 +9,26 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from diagrams.snake.wire_replay import draw_wires
 from plants.snake.actuation import wire_lengths
-from plants.snake.kinematics import Array, centreline
+from plants.snake.kinematics import centreline
 from plants.snake.looks import BRASS, PLATE, SWEPT
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import Array, posture_of
 from systems.common.parameter import check
 
 
-def show_snake(meshcat: Any, q: Array, params: SnakeParams | None = None) -> Array:
+def show_snake(meshcat: Any, x: Array, params: SnakeParams | None = None) -> Array:
     """Draws balls, plates, tool and wires of a posture.
 
     Args:
         meshcat: Where to draw.
-        q: Posture, (7,).
+        x: Posture, (7,).
         params: The snake.
 
     Returns:
         Lengths of wires 0 to 8 in m, (9,).
     """
     params = check(params or SnakeParams())
-    points = centreline(q, params)
+    points = centreline(x, params)
     plate = Cylinder(params.body_radius, params.plate_thickness)
     for i in range(7):
         # A plate stands h past each ball, and one h before the first.
@@ -43,8 +44,8 @@ def show_snake(meshcat: Any, q: Array, params: SnakeParams | None = None) -> Arr
     if params.tool_radius > 0.0:
         meshcat.SetObject("snake/tool", Sphere(params.tool_radius), Rgba(*SWEPT))
         meshcat.SetTransform("snake/tool", RigidTransform(points[7]))
-    draw_wires(meshcat, "snake/wires", q, params)
-    return wire_lengths(q, params)
+    draw_wires(meshcat, "snake/wires", x, params)
+    return wire_lengths(x, params)
 
 
 def bend_with_sliders(
@@ -72,11 +73,12 @@ def bend_with_sliders(
         meshcat.AddSlider(name, low, high, 0.01, start[name[:-1]])
     end = monotonic() + seconds
     while True:
-        q = np.array([0.0, *(meshcat.GetSliderValue(name) for name in sliders)])
-        show_snake(meshcat, q, params)
+        bends = [meshcat.GetSliderValue(name) for name in sliders]
+        x = posture_of([0.0, *bends])
+        show_snake(meshcat, x, params)
         if monotonic() >= end:
             break
         sleep(0.05)
     for name in sliders:
         meshcat.DeleteSlider(name)
-    return q
+    return x

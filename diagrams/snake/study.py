@@ -14,21 +14,25 @@ from diagrams.snake.metrics import break_time, measure
 from diagrams.snake.plots import plots
 from diagrams.snake.scenario import SnakeScenario, check
 from diagrams.snake.wire_replay import animate_wires
+from plants.snake.posture import posture_of
+from plants.snake.signals import Drums, Tensions, ToolPose
+from systems.resection.wires.resection_ik import IkStatus
+from systems.resection.wires.snake_location import Bends, CouplerError
+from systems.resection.wires.wire_drums import Limited
+from systems.resection.wires.wire_forward_actuation import Residual
+from systems.resection.wires.wire_watch import Alarm
 
-XYZ = ("x", "y", "z")
-TOOL = (*XYZ, "n_x", "n_y", "n_z")
-NINE = tuple(f"w{i}" for i in range(9))
 SIGNALS = {
-    "tip.reference": TOOL,
-    "snake.tool": TOOL,
-    "snake.posture": ("s", "alpha1", "beta1", "alpha2", "beta2", "alpha3", "beta3"),
-    "snake.coupler_error": ("angle",),
-    "ik.status": ("code",),
-    "drums.lengths": (*NINE, "s"),
-    "drums.limited": ("code",),
-    "wires.residual": ("module1", "module2", "module3"),
-    "wires.tension": NINE,
-    "watch.alarm": ("time", "module"),
+    "tip.reference": ToolPose,
+    "snake.tool": ToolPose,
+    "snake.posture": Bends,
+    "snake.coupler_error": CouplerError,
+    "ik.status": IkStatus,
+    "drums.lengths": Drums,
+    "drums.limited": Limited,
+    "wires.residual": Residual,
+    "wires.tension": Tensions,
+    "watch.alarm": Alarm,
 }
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
@@ -55,14 +59,14 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
         animation,
         "wires",
         time[::every],
-        run.matrix("snake.posture")[::every],
+        posture_of(run.snake.posture.q[::every]),
         run.scenario.snake,
         broken,
     )
-    tool = run.matrix("snake.tool")[:, :3]
-    draw_trail(meshcat, animation, "trail", time, tool, (0.12, 0.37, 0.85, 1.0))
+    blue = (0.12, 0.37, 0.85, 1.0)
+    draw_trail(meshcat, animation, "trail", time, run.snake.tool.p, blue)
     green = Rgba(0.16, 0.56, 0.31, 1.0)
-    reference = run.matrix("tip.reference")[:, :3]
+    reference = run.tip.reference.p
     if run.scenario.tip.poses:
         for i, point in enumerate(np.unique(reference, axis=0)):
             meshcat.SetObject(f"poses/{i}", Sphere(0.9e-3), green)
@@ -78,7 +82,7 @@ STUDY = Study(
     make_diagram=lambda case: make_snake_diagram(case.scenario),
     check=check,
     measure=measure,
-    signals=SIGNALS,
+    signals=lambda scenario: SIGNALS,
     log_period=LOG_PERIOD,
     plots=plots,
     decorate=decorate,

@@ -15,18 +15,18 @@ COLORS = ((0.85, 0.20, 0.16, 1.0), (0.10, 0.55, 0.28, 1.0), (0.13, 0.35, 0.80, 1
 """Wires of modules 1, 2 and 3."""
 
 
-def wire_poses(q: np.ndarray, params: SnakeParams) -> dict[str, RigidTransform]:
+def wire_poses(x: np.ndarray, params: SnakeParams) -> dict[str, RigidTransform]:
     """Poses in W of all pieces of all wires, by name.
 
     Three pieces across each ball: one from either plate, one on the ball.
 
     Args:
-        q: Posture, (7,).
+        x: Posture, (7,).
         params: The snake.
     """
     poses = {}
     R = params.ball_radius
-    for ball, (centre, P, P_far) in enumerate(hanging_points(q, params)):
+    for ball, (centre, P, P_far) in enumerate(hanging_points(x, params)):
         B, C = tangent_points(centre, P, P_far, params)
         off = (B + C) / 2 - centre
         far = np.linalg.norm(off, axis=1)[:, None]
@@ -44,10 +44,10 @@ def wire_poses(q: np.ndarray, params: SnakeParams) -> dict[str, RigidTransform]:
     return poses
 
 
-def draw_wires(meshcat: Any, path: str, q: np.ndarray, params: SnakeParams) -> None:
+def draw_wires(meshcat: Any, path: str, x: np.ndarray, params: SnakeParams) -> None:
     """Draws the wires of one posture (7,)."""
     chord = 2 * params.ball_radius * np.sin(params.max_bend / 2)
-    for name, X_WG in wire_poses(q, params).items():
+    for name, X_WG in wire_poses(x, params).items():
         length = chord if name.endswith("middle") else params.face
         color = Rgba(*COLORS[int(name[4]) // 3])
         meshcat.SetObject(f"{path}/{name}", Capsule(WIRE_RADIUS, length), color)
@@ -59,7 +59,7 @@ def animate_wires(
     animation: Any,
     path: str,
     times: np.ndarray,
-    q: np.ndarray,
+    x: np.ndarray,
     params: SnakeParams,
     broken: Mapping[int, float] | None = None,
 ) -> None:
@@ -70,12 +70,12 @@ def animate_wires(
         animation: Its recording.
         path: Meshcat path.
         times: Key frames [s], (n,).
-        q: Postures there, (n, 7).
+        x: Postures there, (n, 7).
         params: The snake.
         broken: When wires snapped [s]: they vanish.
     """
-    draw_wires(meshcat, path, q[0], params)
-    for time, posture in zip(times, q, strict=True):
+    draw_wires(meshcat, path, x[0], params)
+    for time, posture in zip(times, x, strict=True):
         frame = animation.frame(time)
         for name, X_WG in wire_poses(posture, params).items():
             animation.SetTransform(frame, f"{path}/{name}", X_WG)

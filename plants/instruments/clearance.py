@@ -12,7 +12,7 @@ from pydrake.geometry import QueryObject
 from systems.common.block import Block
 from systems.common.signal import Field, Many
 
-TOOLS = (("O", "obstacle"), ("S", "target"), ("C", "camera"))
+TOOLS = (("obstacle", "obstacle"), ("target", "target"), ("camera", "camera"))
 """Name and role of the tools, in the order of the port."""
 
 

@@ -32,7 +32,7 @@ from systems.common.parameter import ParameterError, check, parameter
 from systems.common.signal import view
 from systems.common.signals import Shaft
 
-TOOLS = (("S", "target"), ("O", "obstacle"), ("C", "camera"))
+TOOLS = (("target", "target"), ("obstacle", "obstacle"), ("camera", "camera"))
 """Name and role of each tool."""
 
 
@@ -73,8 +73,8 @@ class PosedTools(Block):
     Each tool's frame has its origin at the tip and its z axis along the shaft,
     towards the tip; the shaft is a capsule whose surface ends at the tip.
 
-    Ports ``S``, ``O`` and ``C``, or of whatever names the tools have, accept a `Shaft`
-    each.
+    Ports ``target``, ``obstacle`` and ``camera``, or of whatever names the tools have,
+    accept a `Shaft` each.
     Port ``poses`` emits the frames' poses for the SceneGraph (FramePoseVector).
 
     Attributes:

@@ -3,11 +3,11 @@
 A wire hangs between the points P_i and P'_i of two plates across a ball. The paper
 needs ||P_i P'_i||; it is a perfect square, and linear in the half turn of a ball
 
-    x = (cos(beta/2), sin(beta/2) cos(alpha), sin(beta/2) sin(alpha)),   |x| = 1:
-    p_i = ||P_i P'_i|| = (2h - e) x_0 - 2R (x_1 cos(phi_i) + x_2 sin(phi_i)).
+    u = (cos(beta/2), sin(beta/2) cos(alpha), sin(beta/2) sin(alpha)),   |u| = 1:
+    p_i = ||P_i P'_i|| = (2h - e) u_0 - 2R (u_1 cos(phi_i) + u_2 sin(phi_i)).
 
-So three wires of a module give x by one constant 3 x 3 matrix, smooth at beta = 0,
-and |x|^2 - 1 says how well the redundant third wire agrees: a slack or broken wire
+So three wires of a module give u by one constant 3 x 3 matrix, smooth at beta = 0,
+and |u|^2 - 1 says how well the redundant third wire agrees: a slack or broken wire
 shows there. No elimination is needed; `two_wires` holds the paper's own choice.
 
 Wires count from the base: 0 to 2 are module 1's, 3 to 5 module 2's (they run
@@ -24,9 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.kinematics import Array, postures
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
-from systems.common.compiled import compiled
+from plants.snake.posture import Array, bends_of, whole_postures
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, dot, unit
 
 
 @compiled
@@ -52,59 +53,53 @@ def norm_of_length(L: float, R: float, e: float, h: float) -> float:
 
 
 @compiled
-def _lengths(q: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
-    x = np.empty(3)
-    for i in range(q.shape[0]):
-        L[i] = 0.0
-        for m in range(MODULES):
-            _half_turn(q[i, 1 + 2 * m], q[i, 2 + 2 * m], x)
-            add_module(x, rows, m, R, e, h, 1.0, L[i])
-
-
-@compiled
-def _half_turn(alpha: float, beta: float, x: Any) -> None:
-    s = math.sin(beta / 2)
-    x[0], x[1], x[2] = math.cos(beta / 2), s * math.cos(alpha), s * math.sin(alpha)
+def half_turn(a: float, b: float) -> Vector:
+    """U of a module with the angles a and b."""
+    c = math.sqrt((1 + math.cos(a) * math.cos(b)) / 2)
+    return c, math.sin(b) / (2 * c), -math.sin(a) * math.cos(b) / (2 * c)
 
 
 @compiled
 def add_module(
-    x: Any, rows: Any, m: int, R: float, e: float, h: float, sign: float, L: Any
+    u: Numbers, rows: Any, m: int, R: float, e: float, h: float, sign: float, L: Any
 ) -> None:
     """Adds a module's share, times sign, to all wires through it (compiled)."""
     for w in range(WIRES * m, WIRES * MODULES):
-        p = rows[w, 0] * x[0] + rows[w, 1] * x[1] + rows[w, 2] * x[2]
-        L[w] += sign * length_of_norm(p, R, e, h)
+        L[w] += sign * length_of_norm(dot(rows[w], u), R, e, h)
 
 
 @compiled
-def _bends(
-    L: Any, rows: Any, inverse: Any, R: float, e: float, h: float, q: Any, residual: Any
+def _lengths(x: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
+    for i in range(len(x)):
+        L[i] = 0.0
+        for m in range(MODULES):
+            u = half_turn(x[i, 1 + 2 * m], x[i, 2 + 2 * m])
+            add_module(u, rows, m, R, e, h, 1.0, L[i])
+
+
+@compiled
+def _angles(
+    L: Any, rows: Any, inverse: Any, R: float, e: float, h: float, ab: Any, off: Any
 ) -> None:
-    x, left, p = np.empty(3), np.empty(WIRES * MODULES), np.empty(WIRES)
-    for i in range(L.shape[0]):
+    left, p = np.empty(WIRES * MODULES), np.empty(WIRES)
+    for i in range(len(L)):
         left[:] = L[i]
         for m in range(MODULES):
             for j in range(WIRES):
                 p[j] = norm_of_length(left[WIRES * m + j], R, e, h)
-            for r in range(3):
-                row = inverse[m, r]
-                x[r] = row[0] * p[0] + row[1] * p[1] + row[2] * p[2]
-            lateral = x[1] * x[1] + x[2] * x[2]
-            square = x[0] * x[0] + lateral
-            residual[i, m] = square - 1.0
-            q[i, 2 * m] = math.atan2(x[2], x[1])
-            q[i, 2 * m + 1] = 2 * math.atan2(math.sqrt(lateral), x[0])
+            back = inverse[m]
+            u = (dot(back[0], p), dot(back[1], p), dot(back[2], p))
+            square = dot(u, u)
+            off[i, m] = square - 1.0
+            ab[i, 2 * m] = math.atan2(-2 * u[0] * u[2], 2 * u[0] * u[0] - square)
+            ab[i, 2 * m + 1] = math.asin(2 * u[0] * u[1] / square)
             if m < MODULES - 1:
-                size = math.sqrt(square)
-                for r in range(3):
-                    x[r] /= size
-                add_module(x, rows, m, R, e, h, -1.0, left)
+                add_module(unit(u), rows, m, R, e, h, -1.0, left)
 
 
 @lru_cache(maxsize=16)
 def _matrices(R: float, d: float, first_azimuths: tuple[float, ...]) -> Any:
-    """Rows that take x to p_i, (9, 3), and each module's inverse, (3, 3, 3)."""
+    """Rows that take u to p_i, (9, 3), and each module's inverse, (3, 3, 3)."""
     turns = 2 * np.pi / WIRES * np.arange(WIRES)
     phi = np.add.outer(np.array(first_azimuths), turns).ravel()
     rows = np.stack(
@@ -114,7 +109,7 @@ def _matrices(R: float, d: float, first_azimuths: tuple[float, ...]) -> Any:
 
 
 def norm_rows(params: SnakeParams) -> Array:
-    """Rows that take x to p_i, one a wire, (9, 3) in m."""
+    """Rows that take u to p_i, one a wire, (9, 3) in m."""
     return _matrices(params.ball_radius, params.face, tuple(params.first_azimuths))[0]
 
 
@@ -122,20 +117,20 @@ def _geometry(params: SnakeParams) -> tuple[float, float, float]:
     return params.ball_radius, params.plate_thickness, params.half_pitch
 
 
-def wire_lengths(q: ArrayLike, params: SnakeParams) -> Array:
+def wire_lengths(x: ArrayLike, params: SnakeParams) -> Array:
     """Lengths of the nine wires in m, equations (2) and (3).
 
     Args:
-        q: Postures (..., 7).
+        x: Postures (..., 7).
         params: The snake.
 
     Returns:
         Lengths (..., 9).
     """
-    q = postures(q)
-    L = np.empty((*q.shape[:-1], WIRES * MODULES))
+    x = whole_postures(x)
+    L = np.empty((*x.shape[:-1], WIRES * MODULES))
     _lengths(
-        np.ascontiguousarray(q.reshape(-1, 7)),
+        np.ascontiguousarray(x.reshape(-1, 7)),
         norm_rows(params),
         *_geometry(params),
         L.reshape(-1, WIRES * MODULES),
@@ -144,20 +139,20 @@ def wire_lengths(q: ArrayLike, params: SnakeParams) -> Array:
 
 
 @dataclass
-class Bends:
-    """Bends from wire lengths.
+class Angles:
+    """A posture's angles from wire lengths.
 
     Attributes:
-        q: alpha1, beta1, alpha2, ... in rad, (..., 6). NaN from the first module
-            on whose wires have lengths that no posture has.
-        residual: |x|^2 - 1 of each module, (..., 3): 0 if its three wires agree.
+        ab: a1, b1, ..., a3, b3 in rad, (..., 6). NaN from the first module on whose
+            wires have lengths that no posture has.
+        residual: |u|^2 - 1 of each module, (..., 3): 0 if its three wires agree.
     """
 
-    q: Array
+    ab: Array
     residual: Array
 
 
-def bends_of_lengths(L: ArrayLike, params: SnakeParams) -> Bends:
+def angles_of_lengths(L: ArrayLike, params: SnakeParams) -> Angles:
     """Forward actuation from all wires, module after module (paper, IV.C).
 
     Args:
@@ -170,17 +165,17 @@ def bends_of_lengths(L: ArrayLike, params: SnakeParams) -> Bends:
     rows, inverse = _matrices(
         params.ball_radius, params.face, tuple(params.first_azimuths)
     )
-    q = np.empty((*L.shape[:-1], 2 * MODULES))
+    ab = np.empty((*L.shape[:-1], 2 * MODULES))
     residual = np.empty((*L.shape[:-1], MODULES))
-    _bends(
+    _angles(
         np.ascontiguousarray(L.reshape(-1, WIRES * MODULES)),
         rows,
         inverse,
         *_geometry(params),
-        q.reshape(-1, 2 * MODULES),
+        ab.reshape(-1, 2 * MODULES),
         residual.reshape(-1, MODULES),
     )
-    return Bends(q, residual)
+    return Angles(ab, residual)
 
 
 def length_range(params: SnakeParams) -> tuple[Array, Array]:
@@ -197,8 +192,8 @@ def length_range(params: SnakeParams) -> tuple[Array, Array]:
     return through * shortest, through * longest
 
 
-def checked_bends(L: ArrayLike, params: SnakeParams, tolerance: float = 1e-6) -> Array:
-    """Bends (6,) for one set of lengths (9,) that a posture must have.
+def checked_angles(L: ArrayLike, params: SnakeParams, tolerance: float = 1e-6) -> Array:
+    """a1, b1, ..., b3 (6,) for one set of lengths (9,) that a posture must have.
 
     Args:
         L: Lengths in m, (9,).
@@ -216,15 +211,15 @@ def checked_bends(L: ArrayLike, params: SnakeParams, tolerance: float = 1e-6) ->
             f"wire {w} of module {w // WIRES + 1}: length {1e3 * L[w]:.3f} mm, no "
             f"posture is outside {1e3 * low[w]:.3f} to {1e3 * high[w]:.3f} mm"
         )
-    bends = bends_of_lengths(L, params).q
+    x = np.append(0.0, angles_of_lengths(L, params).ab)
+    nearest = wire_lengths(x, params)
     for m in range(MODULES):
-        beta = float(bends[2 * m + 1])
+        beta = float(bends_of(x)[2 + 2 * m])
         if not beta <= params.max_bend + tolerance / params.ball_radius:
             raise ValueError(
                 f"module {m + 1}: these lengths bend it by beta={beta:.4f} rad, "
                 f"beyond max_bend={params.max_bend:.4f} rad"
             )
-        nearest = wire_lengths(np.concatenate([[0.0], bends]), params)
         own = slice(WIRES * m, WIRES * (m + 1))
         worst = float(np.abs(nearest - L)[own].max())
         if not worst <= tolerance:
@@ -234,4 +229,4 @@ def checked_bends(L: ArrayLike, params: SnakeParams, tolerance: float = 1e-6) ->
                 f"{1e3 * worst:.3f} mm; nearest "
                 f"{np.round(1e3 * nearest[own], 3).tolist()} mm"
             )
-    return bends
+    return x[1:]

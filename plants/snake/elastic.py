@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.actuation import add_module, norm_rows
+from plants.snake.actuation import add_module, half_turn, norm_rows
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.kinematics import Array
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
+from plants.snake.posture import Array
 from plants.snake.tension import length_gradients
 from systems.common.compiled import compiled
 
@@ -32,15 +32,11 @@ def _pull(
     count = WIRES * MODULES
     L, rate = np.zeros(count), np.zeros(count)
     J = np.empty((MODULES, count, 2))
-    x = np.empty(3)
     for m in range(MODULES):
         a, b = ab[2 * m], ab[2 * m + 1]
         first = WIRES * m
         length_gradients(a, b, rows[first:], R, h, e, J[m, first:])
-        x[0] = np.sqrt((1 + np.cos(a) * np.cos(b)) / 2)
-        x[1] = np.sin(b) / (2 * x[0])
-        x[2] = -np.sin(a) * np.cos(b) / (2 * x[0])
-        add_module(x, rows, m, R, e, h, 1.0, L)
+        add_module(half_turn(a, b), rows, m, R, e, h, 1.0, L)
         for w in range(first, count):
             rate[w] += J[m, w, 0] * ab_rate[2 * m] + J[m, w, 1] * ab_rate[2 * m + 1]
     tau[:] = 0.0
@@ -64,7 +60,7 @@ def elastic_pull(
     """Tensions of elastic wires, T = max(0, k (L - L_d) + c (dL - dL_d)/dt).
 
     Args:
-        ab: Universal angles (a1, b1, ..., b3) in rad, (6,).
+        ab: Angles (a1, b1, ..., b3) in rad, (6,).
         ab_rate: Their rates in rad/s, (6,).
         wound: L_d, what the drums have wound out, in m, (9,).
         wound_rate: Its rates in m/s, (9,).

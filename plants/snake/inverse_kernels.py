@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from systems.common.compiled import compiled
+from plants.snake.posture import module_angles
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, along, dot
 
 REACHED = 0
 BEND = 1  # outside the reach of modules 1 and 2 whatever the translation
@@ -62,16 +64,22 @@ def _middle_axis(k: float, x: float, y: float, n: Any, t_max: float) -> Any:
 
 
 @compiled
-def _turn_back(alpha: float, beta: float, n: Any) -> Any:
+def _before(alpha: float, beta: float, n: Numbers) -> Vector:
+    """An axis of W as the end of the module (alpha, beta) has it."""
+    ca, sa = math.cos(alpha), math.sin(alpha)
+    c2, s2 = math.cos(2 * beta), math.sin(2 * beta)
+    radial, across = ca * n[0] + sa * n[1], ca * n[1] - sa * n[0]
+    t, z = c2 * radial - s2 * n[2], s2 * radial + c2 * n[2]
+    return ca * t - sa * across, sa * t + ca * across, z
+
+
+@compiled
+def _turn_back(alpha: float, beta: float, n: Numbers) -> tuple[float, float]:
     """Azimuth and bend, per ball, that take a module's end axis to n.
 
     n is expressed in W; (alpha, beta) is the one module before.
     """
-    ca, sa = math.cos(alpha), math.sin(alpha)
-    c2, s2 = math.cos(2 * beta), math.sin(2 * beta)
-    along, across = ca * n[0] + sa * n[1], ca * n[1] - sa * n[0]
-    t, z = c2 * along - s2 * n[2], s2 * along + c2 * n[2]
-    x, y = ca * t - sa * across, sa * t + ca * across
+    x, y, z = _before(alpha, beta, n)
     return math.atan2(y, x), math.atan2(math.hypot(x, y), z) / 2
 
 
@@ -142,16 +150,60 @@ def _positioning(p: Any, n: Any, h: float, bend: float, travel: Any, q: Any) -> 
 
 
 @compiled
-def solve_positionings(
-    p: Any, n: Any, h: float, bend: float, travel: Any, q: Any, status: Any
-) -> None:
-    """Positioning postures (N, 5) and statuses (N,) for p_WI, n_WI (N, 3) (compiled).
+def _as_posture(modules: int, x: Any) -> None:
+    """Takes azimuth and bend of the first modules for a and b, in place."""
+    for k in range(modules):
+        x[1 + 2 * k], x[2 + 2 * k] = module_angles(x[1 + 2 * k], x[2 + 2 * k])
 
-    NaN stands in q where the bends do not reach.
+
+@compiled
+def solve_positioning(
+    p: Numbers, n: Numbers, h: float, bend: float, travel: Numbers, x: Any
+) -> int:
+    """Puts O2 at p_WI, its axis along n_WI: (s, a1, b1, a2, b2) into x; the status.
+
+    NaN stands in x where the bends do not reach.
     """
-    for i in range(p.shape[0]):
-        q[i, :] = np.nan
-        status[i] = _positioning(p[i], n[i], h, bend, travel, q[i])
+    x[:] = np.nan
+    status = _positioning(p, n, h, bend, travel, x)
+    _as_posture(2, x)
+    return status
+
+
+@compiled
+def solve_tool(
+    p: Numbers,
+    n: Numbers,
+    m: Numbers,
+    h: float,
+    tool: float,
+    bend: float,
+    travel: Numbers,
+    x: Any,
+) -> int:
+    """The posture with p_WT = p, n_WT = n, n_WI = m, into x (7,); the status."""
+    x[:] = np.nan
+    c = dot(m, n)
+    if c < math.cos(2 * bend) - 2 * SLACK:
+        return LAST_BEND
+    both = math.sqrt(2 + 2 * c)
+    mid = (m[0] + n[0]) / both, (m[1] + n[1]) / both, (m[2] + n[2]) / both
+    O3 = along(p, -tool, n)
+    status = _positioning(along(O3, -2 * h, along(mid, 1.0, n)), m, h, bend, travel, x)
+    if status != BEND:
+        # Undo module 1, then module 2 gives the last one's azimuth and bend.
+        x[5], x[6] = _turn_back(x[3], x[4], _before(x[1], x[2], n))
+    _as_posture(3, x)
+    return status
+
+
+@compiled
+def solve_positionings(
+    p: Any, n: Any, h: float, bend: float, travel: Numbers, x: Any, status: Any
+) -> None:
+    """As `solve_positioning` for many poses (N, 3), postures (N, 5), statuses (N,)."""
+    for i in range(len(p)):
+        status[i] = solve_positioning(p[i], n[i], h, bend, travel, x[i])
 
 
 @compiled
@@ -162,28 +214,10 @@ def solve_tools(
     h: float,
     tool: float,
     bend: float,
-    travel: Any,
-    q: Any,
+    travel: Numbers,
+    x: Any,
     status: Any,
 ) -> None:
-    """Postures (N, 7) and statuses (N,) for p_WT, n_WT, m = n_WI (N, 3) (compiled)."""
-    p_I = np.empty(3)
-    for i in range(p.shape[0]):
-        q[i, :] = np.nan
-        c = m[i, 0] * n[i, 0] + m[i, 1] * n[i, 1] + m[i, 2] * n[i, 2]
-        if c < math.cos(2 * bend) - 2 * SLACK:
-            status[i] = LAST_BEND
-            continue
-        both = math.sqrt(2 + 2 * c)
-        for r in range(3):
-            mid = (m[i, r] + n[i, r]) / both
-            p_I[r] = p[i, r] - tool * n[i, r] - 2 * h * (mid + n[i, r])
-        status[i] = _positioning(p_I, m[i], h, bend, travel, q[i])
-        if status[i] != BEND:
-            # Undo module 1, then module 2 gives the last one's azimuth and bend.
-            a, b = q[i, 1], q[i, 2]
-            ca, sa, c2, s2 = math.cos(a), math.sin(a), math.cos(2 * b), math.sin(2 * b)
-            along, across = ca * n[i, 0] + sa * n[i, 1], ca * n[i, 1] - sa * n[i, 0]
-            t, z = c2 * along - s2 * n[i, 2], s2 * along + c2 * n[i, 2]
-            p_I[0], p_I[1], p_I[2] = ca * t - sa * across, sa * t + ca * across, z
-            q[i, 5], q[i, 6] = _turn_back(q[i, 3], q[i, 4], p_I)
+    """As `solve_tool` for many poses (N, 3), postures (N, 7), statuses (N,)."""
+    for i in range(len(p)):
+        status[i] = solve_tool(p[i], n[i], m[i], h, tool, bend, travel, x[i])

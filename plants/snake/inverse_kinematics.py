@@ -22,29 +22,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from plants.snake.inverse_kernels import (
-    BEND,
-    LAST_BEND,
     REACHED,
-    TRAVEL_HIGH,
-    TRAVEL_LOW,
     solve_positionings,
+    solve_tool,
     solve_tools,
 )
-from plants.snake.kinematics import Array
 from plants.snake.parameters import SnakeParams
-
-__all__ = [
-    "BEND",
-    "LAST_BEND",
-    "REACHED",
-    "TRAVEL_HIGH",
-    "TRAVEL_LOW",
-    "Solutions",
-    "positioning",
-    "tool_posture",
-    "tool_postures",
-    "vectors",
-]
+from plants.snake.posture import Array
 
 
 def vectors(name: str, value: ArrayLike, unit: bool = False) -> Array:
@@ -71,13 +55,13 @@ class Solutions:
     """Answers of the inverse kinematics.
 
     Attributes:
-        q: Postures, (..., 5) or (..., 7): s, alpha1, beta1, ... NaN if the bends
-            do not reach; if only the translation falls short, the posture that
-            its travel forbids.
-        status: REACHED, or the limit in the way, (...) of int.
+        x: Postures, (..., 5) or (..., 7): s, a1, b1, ... NaN if the bends do not
+            reach; if only the translation falls short, the posture that its travel
+            forbids.
+        status: REACHED, or the limit in the way (`inverse_kernels`), (...) of int.
     """
 
-    q: Array
+    x: Array
     status: NDArray[np.int64]
 
     @property
@@ -98,18 +82,18 @@ def positioning(p_WI: ArrayLike, n_WI: ArrayLike, params: SnakeParams) -> Soluti
         Postures (..., 5). For why a pose is refused ask `reachability.refusal`.
     """
     p, n = np.broadcast_arrays(vectors("p_WI", p_WI), vectors("n_WI", n_WI, unit=True))
-    q = np.empty((*p.shape[:-1], 5))
+    x = np.empty((*p.shape[:-1], 5))
     status = np.empty(p.shape[:-1], np.int64)
     solve_positionings(
         np.ascontiguousarray(p).reshape(-1, 3),
         np.ascontiguousarray(n).reshape(-1, 3),
         params.half_pitch,
         params.max_bend,
-        np.asarray(params.travel, float),
-        q.reshape(-1, 5),
+        (params.travel[0], params.travel[1]),
+        x.reshape(-1, 5),
         status.reshape(-1),
     )
-    return Solutions(q, status)
+    return Solutions(x, status)
 
 
 def tool_postures(
@@ -132,7 +116,7 @@ def tool_postures(
         vectors("n_WT", n_WT, unit=True),
         vectors("n_WI", n_WI, unit=True),
     )
-    q = np.empty((*p.shape[:-1], 7))
+    x = np.empty((*p.shape[:-1], 7))
     status = np.empty(p.shape[:-1], np.int64)
     solve_tools(
         np.ascontiguousarray(p).reshape(-1, 3),
@@ -141,11 +125,11 @@ def tool_postures(
         params.half_pitch,
         params.tool_offset,
         params.max_bend,
-        np.asarray(params.travel, float),
-        q.reshape(-1, 7),
+        (params.travel[0], params.travel[1]),
+        x.reshape(-1, 7),
         status.reshape(-1),
     )
-    return Solutions(q, status)
+    return Solutions(x, status)
 
 
 def tool_posture(target: ArrayLike, params: SnakeParams) -> tuple[list[float], int]:
@@ -161,25 +145,16 @@ def tool_posture(target: ArrayLike, params: SnakeParams) -> tuple[list[float], i
     Raises:
         ValueError: If a number is not finite or an axis zero.
     """
-    rows = np.array(target, float).reshape(3, 1, 3)
-    norm = np.sqrt((rows * rows).sum())
-    if not math.isfinite(norm):
+    p, n, m = np.array(target, float).reshape(3, 3)
+    if not math.isfinite(math.hypot(*p, *n, *m)):
         raise ValueError(f"target={target!r} holds numbers that are not finite")
-    for row in rows[1:, 0]:
-        size = math.hypot(*row.tolist())
+    for axis in (n, m):
+        size = math.hypot(*axis)
         if size == 0.0:
             raise ValueError(f"target={target!r} holds a zero vector as an axis")
-        row /= size
-    q, status = np.empty((1, 7)), np.empty(1, np.int64)
-    solve_tools(
-        rows[0],
-        rows[1],
-        rows[2],
-        params.half_pitch,
-        params.tool_offset,
-        params.max_bend,
-        np.array(params.travel),
-        q,
-        status,
-    )
-    return q[0].tolist(), int(status[0])
+        axis /= size
+    x = np.empty(7)
+    h, tool, bend = params.half_pitch, params.tool_offset, params.max_bend
+    travel = (params.travel[0], params.travel[1])
+    status = solve_tool(p, n, m, h, tool, bend, travel, x)
+    return x.tolist(), status

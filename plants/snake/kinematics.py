@@ -1,25 +1,23 @@
-"""Forward kinematics: equation (1), the whole robot, and its Jacobians.
+"""Forward kinematics: equation (1), the whole robot, and its centreline.
 
-A posture q = (s, alpha1, beta1, alpha2, beta2, alpha3, beta3): translation in m,
-azimuth and bend *per ball* of each module in rad. Frames: W is the channel's
-frame with z along the robot; Ok stands at the first ball centre of module k + 1,
-not on its plate (O0 at distance s along z; O3 lies 2 h past the last ball). T is
-the tool, `tool_offset` past O3 along its z.
+Frames: W is the channel's frame with z along the robot; Ok stands at the first ball
+centre of module k + 1, not on its plate (O0 at distance s along z; O3 lies 2 h past the
+last ball). T is the tool, `tool_offset` past O3 along its z.
 
-All functions take one posture or an array of them (the last axis is the posture)
-and broadcast. The heavy ones are compiled, and can be called from compiled code.
+All functions take one posture (`plants.snake.posture`) or an array of them (the last
+axis is the posture) and broadcast.
 """
 
-from collections.abc import Sequence
+import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from plants.snake.parameters import SnakeParams
-from systems.common.compiled import compiled
-
-Array = NDArray[np.float64]
+from plants.snake.posture import Array, bends_of, whole_postures
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, along
 
 POINTS = 8
 """Corners of the centreline: six ball centres, O3 and the tool."""
@@ -57,152 +55,104 @@ def module_transform(alpha: ArrayLike, beta: ArrayLike, h: float) -> Array:
     return X
 
 
-def to_universal(alpha: ArrayLike, beta: ArrayLike) -> tuple[Array, Array]:
-    """Angles (a, b) of the non-singular form: each ball turns Rx(a) Ry(b).
+@compiled
+def turned(u: Numbers, v: Numbers, c: float, s: float) -> tuple[Vector, Vector]:
+    """Axes c u + s v and c v - s u: two of a frame's axes turned in their plane."""
+    return (
+        (c * u[0] + s * v[0], c * u[1] + s * v[1], c * u[2] + s * v[2]),
+        (c * v[0] - s * u[0], c * v[1] - s * u[1], c * v[2] - s * u[2]),
+    )
 
-    A module is Rx(a) Ry(b) Tz(2h) Ry(b) Rx(a) Tz(2h), smooth at beta = 0.
+
+@compiled
+def corners(x: Any, h: float, tool: float, out: Any) -> tuple[Vector, Vector, Vector]:
+    """Six ball centres, O3 and the tool of a posture (7,), into out (8, 3).
+
+    Returns:
+        The axes x, y, z of T in W.
     """
-    sb = np.sin(beta)
-    return np.arctan2(-sb * np.sin(alpha), np.cos(beta)), np.arcsin(sb * np.cos(alpha))
-
-
-def from_universal(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
-    """Azimuth and bend (alpha, beta) from the non-singular angles."""
-    x, y = np.sin(b), -np.sin(a) * np.cos(b)
-    return np.arctan2(y, x), np.arctan2(np.hypot(x, y), np.cos(a) * np.cos(b))
-
-
-@compiled
-def advance(R: Any, p: Any, alpha: float, beta: float, h: float) -> None:
-    """Moves the frame (R, p) to the end of a module, in place (compiled)."""
-    ca, sa = np.cos(alpha), np.sin(alpha)
-    cb, sb = np.cos(beta), np.sin(beta)
-    c2, s2 = cb * cb - sb * sb, 2 * sb * cb
-    lateral, axial = 2 * h * (s2 + sb), 2 * h * (cb + c2)
-    for i in range(3):
-        # Columns x, y seen along the bend: t towards alpha, n across.
-        t = ca * R[i, 0] + sa * R[i, 1]
-        n = ca * R[i, 1] - sa * R[i, 0]
-        z = R[i, 2]
-        p[i] += lateral * t + axial * z
-        t_end = c2 * t - s2 * z
-        R[i, 0] = ca * t_end - sa * n
-        R[i, 1] = sa * t_end + ca * n
-        R[i, 2] = s2 * t + c2 * z
+    p = (0.0, 0.0, x[0])
+    e, f, n = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    for k in range(3):
+        ca, sa = math.cos(x[1 + 2 * k]), math.sin(x[1 + 2 * k])
+        cb, sb = math.cos(x[2 + 2 * k]), math.sin(x[2 + 2 * k])
+        for half in range(2):
+            _put(p, out[2 * k + half])
+            if half == 0:  # Rx(a) Ry(b)
+                f, n = turned(f, n, ca, sa)
+                e, n = turned(e, n, cb, -sb)
+            else:  # Ry(b) Rx(a)
+                e, n = turned(e, n, cb, -sb)
+                f, n = turned(f, n, ca, sa)
+            p = along(p, 2 * h, n)
+    _put(p, out[6])
+    _put(along(p, tool, n), out[7])
+    return e, f, n
 
 
 @compiled
-def _forward(q: Any, h: float, tool: float, X: Any) -> None:
-    R, p = np.empty((3, 3)), np.empty(3)
-    for i in range(q.shape[0]):
-        R[:] = 0.0
-        R[0, 0] = R[1, 1] = R[2, 2] = 1.0
-        p[0] = p[1] = 0.0
-        p[2] = q[i, 0]
-        for k in range(3):
-            advance(R, p, q[i, 1 + 2 * k], q[i, 2 + 2 * k], h)
+def link_axis(c: Any, i: int, h: float) -> Vector:
+    """The robot's axis between corners i and i + 1 of c (8, 3), i < 6."""
+    return (
+        (c[i + 1, 0] - c[i, 0]) / (2 * h),
+        (c[i + 1, 1] - c[i, 1]) / (2 * h),
+        (c[i + 1, 2] - c[i, 2]) / (2 * h),
+    )
+
+
+@compiled
+def _put(p: Numbers, row: Any) -> None:
+    row[0], row[1], row[2] = p[0], p[1], p[2]
+
+
+@compiled
+def _centreline(x: Any, h: float, tool: float, out: Any) -> None:
+    for i in range(len(x)):
+        corners(x[i], h, tool, out[i])
+
+
+@compiled
+def _forward(x: Any, h: float, tool: float, X: Any) -> None:
+    c = np.empty((POINTS, 3))
+    for i in range(len(x)):
+        axes = corners(x[i], h, tool, c)
         for r in range(3):
-            X[i, r, 0], X[i, r, 1], X[i, r, 2] = R[r, 0], R[r, 1], R[r, 2]
-            X[i, r, 3] = p[r] + tool * R[r, 2]
+            for k in range(3):
+                X[i, r, k] = axes[k][r]
+            X[i, r, 3] = c[7, r]
             X[i, 3, r] = 0.0
         X[i, 3, 3] = 1.0
 
 
-@compiled
-def _centreline(q: Any, h: float, tool: float, out: Any) -> None:
-    R, p = np.empty((3, 3)), np.empty(3)
-    for i in range(q.shape[0]):
-        R[:] = 0.0
-        R[0, 0] = R[1, 1] = R[2, 2] = 1.0
-        p[0] = p[1] = 0.0
-        p[2] = q[i, 0]
-        for k in range(3):
-            alpha, beta = q[i, 1 + 2 * k], q[i, 2 + 2 * k]
-            lateral = 2 * h * np.sin(beta)
-            x, y = lateral * np.cos(alpha), lateral * np.sin(alpha)
-            z = 2 * h * np.cos(beta)
-            for r in range(3):
-                out[i, 2 * k, r] = p[r]
-                out[i, 2 * k + 1, r] = p[r] + R[r, 0] * x + R[r, 1] * y + R[r, 2] * z
-            advance(R, p, alpha, beta, h)
-        for r in range(3):
-            out[i, 6, r] = p[r]
-            out[i, 7, r] = p[r] + tool * R[r, 2]
-
-
-def postures(q: ArrayLike) -> Array:
-    """Checks the shape of postures.
-
-    Raises:
-        ValueError: If the last axis is not 7 long.
-    """
-    q = np.asarray(q, float)
-    if q.ndim == 0 or q.shape[-1] != 7:
-        raise ValueError(
-            f"q has shape {q.shape}, a posture has 7 numbers on the last axis: "
-            "s, alpha1, beta1, alpha2, beta2, alpha3, beta3"
-        )
-    return q
-
-
-def forward(q: ArrayLike, params: SnakeParams) -> Array:
+def forward(x: ArrayLike, params: SnakeParams) -> Array:
     """X_WT, pose of the tool. Postures (..., 7) to transforms (..., 4, 4)."""
-    q = postures(q)
-    X = np.empty((*q.shape[:-1], 4, 4))
-    _forward(
-        np.ascontiguousarray(q.reshape(-1, 7)),
-        params.half_pitch,
-        params.tool_offset,
-        X.reshape(-1, 4, 4),
-    )
+    x = whole_postures(x)
+    X = np.empty((*x.shape[:-1], 4, 4))
+    rows = np.ascontiguousarray(x.reshape(-1, 7))
+    _forward(rows, params.half_pitch, params.tool_offset, X.reshape(-1, 4, 4))
     return X
 
 
-def centreline(q: ArrayLike, params: SnakeParams) -> Array:
+def centreline(x: ArrayLike, params: SnakeParams) -> Array:
     """Corners of the robot's axis in W: six ball centres, O3 and the tool.
 
     Between two corners the axis is straight, so these are all a collision check
     needs. Postures (..., 7) to points (..., 8, 3).
     """
-    q = postures(q)
-    points = np.empty((*q.shape[:-1], POINTS, 3))
-    _centreline(
-        np.ascontiguousarray(q.reshape(-1, 7)),
-        params.half_pitch,
-        params.tool_offset,
-        points.reshape(-1, POINTS, 3),
-    )
-    return points
+    x = whole_postures(x)
+    out = np.empty((*x.shape[:-1], POINTS, 3))
+    rows = np.ascontiguousarray(x.reshape(-1, 7))
+    h, tool = params.half_pitch, params.tool_offset
+    _centreline(rows, h, tool, out.reshape(-1, POINTS, 3))
+    return out
 
 
-def frames(q: Sequence[float] | Array, params: SnakeParams) -> list[Array]:
+def frames(x: ArrayLike, params: SnakeParams) -> list[Array]:
     """X_WO0 to X_WO3 of one posture (7,): four transforms (4, 4)."""
-    q = postures(q)
+    q = bends_of(whole_postures(x))
     X = np.eye(4)
     X[2, 3] = q[0]
     chain = [X]
-    for k in range(3):
-        step = module_transform(q[1 + 2 * k], q[2 + 2 * k], params.half_pitch)
-        chain.append(chain[-1] @ step)
+    for alpha, beta in q[1:].reshape(-1, 2):
+        chain.append(chain[-1] @ module_transform(alpha, beta, params.half_pitch))
     return chain
-
-
-def limit_excess(q: ArrayLike, params: SnakeParams) -> Array:
-    """How far each limit is exceeded: (s, beta1, beta2, beta3), 0 if kept.
-
-    The bend's limit is a cone, beta <= max_bend whatever the azimuth, not a box
-    in (a, b), whose corners reach 60 deg.
-
-    Args:
-        q: Postures (..., 7); a beta < 0 counts as its size.
-        params: The snake.
-
-    Returns:
-        Excess in m (s, signed: < 0 below s_min) and rad, (..., 4).
-    """
-    q = postures(q)
-    excess = np.empty((*q.shape[:-1], 4))
-    low, high = params.travel
-    excess[..., 0] = np.minimum(q[..., 0] - low, 0.0) + np.maximum(q[..., 0] - high, 0)
-    excess[..., 1:] = np.maximum(np.abs(q[..., 2::2]) - params.max_bend, 0.0)
-    return excess

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from plants.snake.inverse_kernels import half_bend
 from plants.snake.inverse_kinematics import vectors
-from plants.snake.kinematics import Array
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import Array, posture_of
 
 
 def meridian(beta: ArrayLike, params: SnakeParams) -> tuple[Array, Array]:
@@ -80,4 +80,4 @@ def entry(p_WT: ArrayLike, params: SnakeParams) -> Array:
             f"translation s={s:.6g} m is outside its travel [{low:g}, {high:g}] m; "
             f"nearest: p_WT with z={p[2] + min(max(s, low), high) - s:.6g} m"
         )
-    return np.array([s, 0.0, 0.0, 0.0, 0.0, alpha, beta])
+    return posture_of([s, 0.0, 0.0, 0.0, 0.0, alpha, beta])

@@ -11,6 +11,9 @@ MODULES = 3
 WIRES = 3
 """Wires of a module (paper, III.A): nine run through the first one."""
 
+DRUMS = WIRES * MODULES + 1
+"""Motors: one a wire, and the one that slides the robot."""
+
 
 LEAST_GAP = math.radians(10.0)
 """Between two wires' holes in a plate."""

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from plants.snake.inverse_kinematics import positioning, vectors
-from plants.snake.kinematics import Array
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import Array
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -47,7 +47,7 @@ class Refusal:
         tilt_gap: Angle in rad by which the axis has to be turned, 0 unless "tilt".
         p_WI: Nearest position, (3,).
         n_WI: Its axis, (3,).
-        q: Posture there, (5,).
+        x: Posture there, (5,).
     """
 
     limits: list[str]
@@ -55,7 +55,7 @@ class Refusal:
     tilt_gap: float
     p_WI: Array
     n_WI: Array
-    q: Array
+    x: Array
 
     def __str__(self) -> str:
         where = ", ".join(f"{1e3 * x:.2f}" for x in self.p_WI)
@@ -176,7 +176,7 @@ def refusal(p_WI: ArrayLike, n_WI: ArrayLike, params: SnakeParams) -> Refusal | 
     missing = prism.miss(p, v)[2]
     limits += ["s_min"] if missing < -1e-12 else []
     limits += ["s_max"] if missing > 1e-12 else []
-    return Refusal(limits, gap, tilt_gap, p_best, n, positioning(p_best, n, params).q)
+    return Refusal(limits, gap, tilt_gap, p_best, n, positioning(p_best, n, params).x)
 
 
 def why_not(

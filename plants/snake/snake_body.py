@@ -1,8 +1,7 @@
 """The snake's body as balls, and driving it from one posture to another.
 
-Postures are in the non-singular coordinates x = (s, a1, b1, a2, b2, a3, b3) of
-`plants.snake.kinematics`, in which a straight line between two postures keeps the
-bend's limit, a cone that is convex there.
+A straight line between two postures (`plants.snake.posture`) keeps the bend's limit, a
+cone that is convex there.
 
 The body is balls of its radius along the axis, the last plate as a cylinder, and the
 thin shank of the tool. Between two balls, 1.6 mm apart, it stands out by 0.08 mm.
@@ -13,9 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
 from plants.tissue.space import (
     FREE,
+    Space,
     body_solid,
     first_forbidden,
     first_solid,
@@ -23,7 +24,8 @@ from plants.tissue.space import (
     roll_back,
     stamp,
 )
-from systems.common.compiled import compiled
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import along, dot, sub
 
 OK = 0
 BODY = 1  # some part of the body meets tissue
@@ -109,110 +111,65 @@ def body_of(
 
 
 @compiled
-def corners(x: Any, h: float, tool: float, out: Any) -> None:
-    """Six ball centres, O3 and the tool of a posture (7,), into out (8, 3)."""
-    p0, p1, p2 = 0.0, 0.0, x[0]
-    # Columns of the rotation: e across x, f across y, n along the robot.
-    e0, e1, e2 = 1.0, 0.0, 0.0
-    f0, f1, f2 = 0.0, 1.0, 0.0
-    n0, n1, n2 = 0.0, 0.0, 1.0
-    for k in range(3):
-        ca, sa = math.cos(x[1 + 2 * k]), math.sin(x[1 + 2 * k])
-        cb, sb = math.cos(x[2 + 2 * k]), math.sin(x[2 + 2 * k])
-        for half in range(2):
-            out[2 * k + half, 0] = p0
-            out[2 * k + half, 1] = p1
-            out[2 * k + half, 2] = p2
-            if half == 0:  # Rx(a) Ry(b)
-                f0, n0 = ca * f0 + sa * n0, ca * n0 - sa * f0
-                f1, n1 = ca * f1 + sa * n1, ca * n1 - sa * f1
-                f2, n2 = ca * f2 + sa * n2, ca * n2 - sa * f2
-                e0, n0 = cb * e0 - sb * n0, cb * n0 + sb * e0
-                e1, n1 = cb * e1 - sb * n1, cb * n1 + sb * e1
-                e2, n2 = cb * e2 - sb * n2, cb * n2 + sb * e2
-            else:  # Ry(b) Rx(a)
-                e0, n0 = cb * e0 - sb * n0, cb * n0 + sb * e0
-                e1, n1 = cb * e1 - sb * n1, cb * n1 + sb * e1
-                e2, n2 = cb * e2 - sb * n2, cb * n2 + sb * e2
-                f0, n0 = ca * f0 + sa * n0, ca * n0 - sa * f0
-                f1, n1 = ca * f1 + sa * n1, ca * n1 - sa * f1
-                f2, n2 = ca * f2 + sa * n2, ca * n2 - sa * f2
-            p0, p1, p2 = p0 + 2 * h * n0, p1 + 2 * h * n1, p2 + 2 * h * n2
-    out[6, 0], out[6, 1], out[6, 2] = p0, p1, p2
-    out[7, 0], out[7, 1], out[7, 2] = p0 + tool * n0, p1 + tool * n1, p2 + tool * n2
-
-
-@compiled
-def _blame(
-    why: Any, part: int, x: float, y: float, z: float, rho: float, at: int
-) -> int:
-    why[0], why[1], why[2], why[3] = part, x, y, z
+def _blame(why: Any, part: int, p: Numbers, rho: float, at: int) -> int:
+    why[0], why[1], why[2], why[3] = part, p[0], p[1], p[2]
     why[4], why[5] = rho, at
     return BODY
 
 
 @compiled
-def check_links(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
+def check_links(s: Space, b: Body, c: Any, first: int, why: Any) -> int:
     """OK or BODY for the round body up to the last ball; as `check_body`."""
     if first == 0:
         z = c[0, 2] - b.h / 2
         while z > -b.body:
-            at = body_solid(s, 0.0, 0.0, z, b.body)
+            p = (0.0, 0.0, z)
+            at = body_solid(s, p, b.body)
             if at != FREE:
-                return _blame(why, 0, 0.0, 0.0, z, b.body, at)
+                return _blame(why, 0, p, b.body, at)
             z -= b.h / 2
     for link in range(first, 5):
         for n in range(4):
-            t = n / 4
-            x = c[link, 0] + t * (c[link + 1, 0] - c[link, 0])
-            y = c[link, 1] + t * (c[link + 1, 1] - c[link, 1])
-            z = c[link, 2] + t * (c[link + 1, 2] - c[link, 2])
-            at = body_solid(s, x, y, z, b.body)
+            p = along(c[link], n / 4, sub(c[link + 1], c[link]))
+            at = body_solid(s, p, b.body)
             if at != FREE:
-                return _blame(why, link, x, y, z, b.body, at)
-    x, y, z = c[5, 0], c[5, 1], c[5, 2]
-    at = body_solid(s, x, y, z, b.body)
+                return _blame(why, link, p, b.body, at)
+    at = body_solid(s, c[5], b.body)
     if at != FREE:
-        return _blame(why, 5, x, y, z, b.body, at)
+        return _blame(why, 5, c[5], b.body, at)
     return OK
 
 
 @compiled
-def check_plate(s: Any, b: Any, c: Any, more: float, why: Any) -> int:
+def check_plate(s: Space, b: Body, c: Any, more: float, why: Any) -> int:
     """OK or BODY for the last plate, taken for wider all round by `more` in m."""
     length = 2 * b.h + b.tool
-    n0 = (c[7, 0] - c[5, 0]) / length
-    n1 = (c[7, 1] - c[5, 1]) / length
-    n2 = (c[7, 2] - c[5, 2]) / length
-    x, y, z = c[5, 0] - more * n0, c[5, 1] - more * n1, c[5, 2] - more * n2
-    at = plate_solid(s, x, y, z, n0, n1, n2, b.face + 2 * more, b.body + more)
+    d = sub(c[7], c[5])
+    n = (d[0] / length, d[1] / length, d[2] / length)
+    p = along(c[5], -more, n)
+    at = plate_solid(s, p, n, b.face + 2 * more, b.body + more)
     if at == FREE:
         return OK
-    half = b.face / 2
-    x, y, z = c[5, 0] + half * n0, c[5, 1] + half * n1, c[5, 2] + half * n2
-    why[6], why[7], why[8] = n0, n1, n2
-    return _blame(why, PLATE, x, y, z, b.body, at)
+    why[6], why[7], why[8] = n
+    return _blame(why, PLATE, along(c[5], b.face / 2, n), b.body, at)
 
 
 @compiled
-def check_shank(s: Any, b: Any, c: Any, why: Any) -> int:
+def check_shank(s: Space, b: Body, c: Any, why: Any) -> int:
     """OK or BODY for the tool's shank."""
     length = 2 * b.h + b.tool
-    along = b.face
-    while along < length - b.radius + b.shank:
-        share = along / length
-        x = c[5, 0] + share * (c[7, 0] - c[5, 0])
-        y = c[5, 1] + share * (c[7, 1] - c[5, 1])
-        z = c[5, 2] + share * (c[7, 2] - c[5, 2])
-        at = first_solid(s, x, y, z, b.shank)
+    far = b.face
+    while far < length - b.radius + b.shank:
+        p = along(c[5], far / length, sub(c[7], c[5]))
+        at = first_solid(s, p, b.shank)
         if at != FREE:
-            return _blame(why, SHANK, x, y, z, b.shank, at)
-        along += b.shank
+            return _blame(why, SHANK, p, b.shank, at)
+        far += b.shank
     return OK
 
 
 @compiled
-def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
+def check_body(s: Space, b: Body, c: Any, first: int, why: Any) -> int:
     """OK or BODY for a body with corners c (8, 3); the culprit goes to why (9,).
 
     Parts 0 to 5 are the links behind each ball (0 what lies in the channel), then
@@ -227,7 +184,7 @@ def check_body(s: Any, b: Any, c: Any, first: int, why: Any) -> int:
 
 
 @compiled
-def check_limits(b: Any, x: Any) -> int:
+def check_limits(b: Body, x: Any) -> int:
     """OK, BEND or TRAVEL."""
     if x[0] < b.low - 1e-9 or x[0] > b.high + 1e-9:
         return TRAVEL
@@ -246,7 +203,7 @@ def between(x0: Any, x1: Any, share: float, out: Any) -> None:
 
 
 @compiled
-def drive(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> int:
+def drive(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> int:
     """Moves from a posture that fits to another, freeing what the tool sweeps.
 
     Every step of the straight line is checked, body first, then tool: the body may
@@ -272,7 +229,7 @@ def drive(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> int:
 
 
 @compiled
-def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
+def drive_far(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> Any:
     """As `drive`, but goes as far as it can and stops there.
 
     Returns:
@@ -281,15 +238,13 @@ def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
     status = check_limits(b, x1)
     if status != OK:
         return status, 0.0
-    c0, c1, x = np.empty((8, 3)), np.empty((8, 3)), np.empty(7)
+    c0, c1, x = np.empty((POINTS, 3)), np.empty((POINTS, 3)), np.empty(7)
     corners(x0, b.h, b.tool, c0)
     corners(x1, b.h, b.tool, c1)
     longest = 0.0
-    for n in range(8):
-        d = 0.0
-        for r in range(3):
-            d += (c1[n, r] - c0[n, r]) ** 2
-        longest = max(longest, d)
+    for n in range(POINTS):
+        d = sub(c1[n], c0[n])
+        longest = max(longest, dot(d, d))
     longest = math.sqrt(longest)
     steps = max(1, math.ceil(EDGE_SHARE * longest / b.step))
     sure, freed, roomed = 0, s.used[0], s.used[1]
@@ -317,15 +272,14 @@ def drive_far(s: Any, b: Any, x0: Any, x1: Any, time: int, why: Any) -> Any:
         if whole and status == OK:
             status = check_shank(s, b, c0, why)
         if whole and status == OK:
-            at = first_forbidden(s, c0[7, 0], c0[7, 1], c0[7, 2], b.radius)
+            at = first_forbidden(s, c0[7], b.radius)
             if at != FREE:
-                why[0], why[1], why[2], why[3] = BALL, c0[7, 0], c0[7, 1], c0[7, 2]
-                why[4], why[5] = b.radius, at
+                _blame(why, BALL, c0[7], b.radius, at)
                 status = TOOL
         if status != OK:
             roll_back(s, freed, roomed)
             return status, sure / steps
         if whole:
-            stamp(s, c0[7, 0], c0[7, 1], c0[7, 2], b.frees, time)
+            stamp(s, c0[7], b.frees, time)
             sure, freed, roomed = n, s.used[0], s.used[1]
     return OK, 1.0

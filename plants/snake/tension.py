@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.actuation import norm_rows
-from plants.snake.jacobian import universal_jacobian
-from plants.snake.kinematics import Array, postures
+from plants.snake.actuation import half_turn, norm_rows
+from plants.snake.jacobian import jacobian
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
+from plants.snake.posture import Array
 from systems.common.compiled import compiled
 
 
@@ -25,8 +25,7 @@ def length_gradients(
 ) -> None:
     """dL/d(a, b) in one module for each row of norms, into J (n, 2) (compiled)."""
     sa, ca, sb, cb = np.sin(a), np.cos(a), np.sin(b), np.cos(b)
-    c = np.sqrt((1 + ca * cb) / 2)
-    xi, eta = sb / (2 * c), -sa * cb / (2 * c)
+    c, xi, eta = half_turn(a, b)
     c_a, c_b = -sa * cb / (4 * c), -ca * sb / (4 * c)
     xi_a, xi_b = -xi * c_a / c, cb / (2 * c) - xi * c_b / c
     eta_a, eta_b = -ca * cb / (2 * c) - eta * c_a / c, sa * sb / (2 * c) - eta * c_b / c
@@ -74,7 +73,7 @@ def _tensions(
 
 
 def length_jacobian(ab: ArrayLike, params: SnakeParams) -> Array:
-    """dL/d(a1, b1, ..., a3, b3) in m/rad at universal angles ab (6,): (9, 6)."""
+    """dL/d(a1, b1, ..., a3, b3) in m/rad at angles ab (6,): (9, 6)."""
     ab = np.asarray(ab, float)
     rows, J = norm_rows(params), np.zeros((WIRES * MODULES, 2 * MODULES))
     R, e, h = params.ball_radius, params.plate_thickness, params.half_pitch
@@ -86,12 +85,12 @@ def length_jacobian(ab: ArrayLike, params: SnakeParams) -> Array:
 
 
 def torques_against(
-    q: ArrayLike, f_T_W: ArrayLike, params: SnakeParams, m_T_W: ArrayLike = (0, 0, 0)
+    x: ArrayLike, f_T_W: ArrayLike, params: SnakeParams, m_T_W: ArrayLike = (0, 0, 0)
 ) -> Array:
     """Torques on (a1, b1, ..., b3) that hold the tool against a load.
 
     Args:
-        q: Posture, (7,).
+        x: Posture, (7,).
         f_T_W: Force on the tool at its origin, in N, (3,).
         params: The snake.
         m_T_W: Moment on the tool, in Nm, (3,).
@@ -100,7 +99,7 @@ def torques_against(
         tau in Nm, (6,), to be given to `tensions`.
     """
     load = np.concatenate([np.asarray(m_T_W, float), np.asarray(f_T_W, float)])
-    return -universal_jacobian(postures(q), params)[:, 1:].T @ load
+    return -jacobian(x, params)[:, 1:].T @ load
 
 
 def tensions(
@@ -109,7 +108,7 @@ def tensions(
     """Smallest tensions that give the torques, each module's least one `least`.
 
     Args:
-        ab: Universal angles (a1, b1, ..., b3) in rad, (6,).
+        ab: Angles (a1, b1, ..., b3) in rad, (6,).
         tau: Generalised forces the wires have to exert on them in Nm, (6,).
         params: The snake.
         least: Minimum tension in N, >= 0.

@@ -1,6 +1,6 @@
 """The paper's forward actuation: two of a module's three wires (IV.B.2).
 
-Two norms p_i leave a line in the half turn x of `actuation`, and |x| = 1 cuts it
+Two norms p_i leave a line in the half turn u of `actuation`, and |u| = 1 cuts it
 twice: two solutions, where the dialytic elimination of the paper [18] has an octic
 with spurious roots. Of the two, at most one is within the bend's limit as long as
 tan(max_bend/2) < R/(2d), which `SnakeParams.rules` demand.
@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from plants.snake.actuation import norm_of_length
-from plants.snake.kinematics import Array
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import Array
 
 
 def all_solutions(

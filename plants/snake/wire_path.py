@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from plants.snake.actuation import norm_rows
-from plants.snake.kinematics import Array, postures
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
+from plants.snake.posture import Array, bends_of, whole_postures
 
 BALLS = 2 * MODULES
 
@@ -22,16 +22,16 @@ def wires_at(ball: int) -> range:
     return range(WIRES * (ball // 2), WIRES * MODULES)
 
 
-def hanging_points(q: Array, params: SnakeParams) -> list[tuple[Array, Array, Array]]:
+def hanging_points(x: Array, params: SnakeParams) -> list[tuple[Array, Array, Array]]:
     """Ball centre O, P_i and P'_i in W for each ball, in m: (3,), (n, 3), (n, 3).
 
     From torsion-free plates, as the paper assumes them.
 
     Args:
-        q: One posture, (7,).
+        x: One posture, (7,).
         params: The snake.
     """
-    q = postures(q)
+    q = bends_of(whole_postures(x))
     h, d = params.half_pitch, params.face
     rows = norm_rows(params)
     # R (cos phi, sin phi, 0)

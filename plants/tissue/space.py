@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from systems.common.compiled import compiled
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, along, dot, norm, sub
 
 SOLID = 2**31 - 1
 """Arrival time of tissue that nothing has removed."""
@@ -64,35 +65,42 @@ class Space(NamedTuple):
 
 
 @compiled
-def in_channel(s: Any, x: float, y: float, z: float, rho: float) -> bool:
+def in_channel(s: Space, p: Numbers, rho: float) -> bool:
     """Whether a ball lies in the access channel."""
-    return z + rho <= s.depth and x * x + y * y <= (s.channel - rho) ** 2
+    across2 = p[0] * p[0] + p[1] * p[1]
+    return p[2] + rho <= s.depth and across2 <= (s.channel - rho) ** 2
 
 
 @compiled
-def in_voxels(s: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+def in_voxels(s: Space, p: Numbers) -> Vector:
     """A point in units of voxels: voxel (i, j, k) has its centre there."""
     return (
-        (x - s.origin[0]) / s.spacing,
-        (y - s.origin[1]) / s.spacing,
-        (z - s.origin[2]) / s.spacing,
+        (p[0] - s.origin[0]) / s.spacing,
+        (p[1] - s.origin[1]) / s.spacing,
+        (p[2] - s.origin[2]) / s.spacing,
     )
 
 
 @compiled
-def on_grid(
-    s: Any, u: float, v: float, w: float, du: float, dv: float, dw: float
-) -> bool:
+def cell(s: Space, voxel: int) -> tuple[int, int, int]:
+    """(i, j, k) of a voxel, from its flat index."""
+    _, ny, nz = s.size
+    return voxel // (ny * nz), voxel // nz % ny, voxel % nz
+
+
+@compiled
+def centre(s: Space, voxel: int) -> Vector:
+    """Where a voxel's centre lies in W, by its flat index."""
+    return along(s.origin, s.spacing, cell(s, voxel))
+
+
+@compiled
+def on_grid(s: Space, u: Vector, half: Vector) -> bool:
     """Whether a box about a point lies on the grid; all in voxels."""
-    nx, ny, nz = s.size
-    return (
-        u - du >= -0.5
-        and v - dv >= -0.5
-        and w - dw >= -0.5
-        and u + du <= nx - 0.5
-        and v + dv <= ny - 0.5
-        and w + dw <= nz - 0.5
-    )
+    for r in range(3):
+        if not (u[r] - half[r] >= -0.5 and u[r] + half[r] <= s.size[r] - 0.5):
+            return False  # also where a number is NaN
+    return True
 
 
 @compiled
@@ -102,41 +110,38 @@ def span(u: float, r: float, size: int) -> tuple[int, int]:
 
 
 @compiled
-def row_span(
-    s: Any, v: float, w: float, left: float, a: int, b: int
-) -> tuple[int, int]:
+def row_span(s: Space, u: Vector, left: float, a: int, b: int) -> tuple[int, int]:
     """A ball's part of row (a, b): first flat index, and one past the last.
 
     Args:
         s: The space.
-        v: The ball's centre along y, in voxels.
-        w: The same along z.
+        u: The ball's centre, in voxels.
         left: Square of its radius in plane a, in voxels.
         a: The row's x.
         b: The row's y.
     """
-    rest = left - (b - v) ** 2
+    rest = left - (b - u[1]) ** 2
     if rest < 0.0:
         return 0, 0
     _, ny, nz = s.size
-    low, high = span(w, math.sqrt(rest), nz)
+    low, high = span(u[2], math.sqrt(rest), nz)
     row = (a * ny + b) * nz
     return row + low, row + high
 
 
 @compiled
-def first_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
+def first_solid(s: Space, p: Numbers, rho: float) -> int:
     """The first voxel that a ball would meet: its flat index, FREE or OUTSIDE."""
-    if in_channel(s, x, y, z, rho):
+    if in_channel(s, p, rho):
         return FREE
-    u, v, w = in_voxels(s, x, y, z)
+    u = in_voxels(s, p)
     r = rho / s.spacing
-    if not on_grid(s, u, v, w, r, r, r):
+    if not on_grid(s, u, (r, r, r)):
         return OUTSIDE
-    for a in range(*span(u, r, s.size[0])):
-        left = r * r - (a - u) ** 2
-        for b in range(*span(v, r, s.size[1])):
-            first, last = row_span(s, v, w, left, a, b)
+    for a in range(*span(u[0], r, s.size[0])):
+        left = r * r - (a - u[0]) ** 2
+        for b in range(*span(u[1], r, s.size[1])):
+            first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.tau[c] == SOLID:
                     return c
@@ -144,100 +149,82 @@ def first_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
 
 
 @compiled
-def voxel_of(s: Any, x: float, y: float, z: float) -> int:
+def voxel_of(s: Space, p: Numbers) -> int:
     """Flat index of the voxel that holds a point; OUTSIDE if none does."""
     nx, ny, nz = s.size
-    i = math.floor((x - s.origin[0]) / s.spacing + 0.5)
-    j = math.floor((y - s.origin[1]) / s.spacing + 0.5)
-    k = math.floor((z - s.origin[2]) / s.spacing + 0.5)
+    u = in_voxels(s, p)
+    i, j, k = math.floor(u[0] + 0.5), math.floor(u[1] + 0.5), math.floor(u[2] + 0.5)
     if 0 <= i < nx and 0 <= j < ny and 0 <= k < nz:
         return (i * ny + j) * nz + k
     return OUTSIDE
 
 
 @compiled
-def body_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
+def body_solid(s: Space, p: Numbers, rho: float) -> int:
     """As `first_solid` for the body's radius, remembering where it fitted."""
-    at = voxel_of(s, x, y, z)
+    at = voxel_of(s, p)
     if at >= 0 and s.roomy[at]:
         return FREE
-    found = first_solid(s, x, y, z, rho)
-    if found == FREE and at >= 0:
-        g = s.spacing
-        _, ny, nz = s.size
-        i, j, k = at // (ny * nz), at // nz % ny, at % nz
-        px, py, pz = s.origin[0] + g * i, s.origin[1] + g * j, s.origin[2] + g * k
-        if first_solid(s, px, py, pz, rho + NEIGHBOUR * g) == FREE:
-            s.roomy[at] = 1
-            s.roomed[s.used[1]] = at
-            s.used[1] += 1
+    found = first_solid(s, p, rho)
+    if found != FREE or at < 0:
+        return found
+    if first_solid(s, centre(s, at), rho + NEIGHBOUR * s.spacing) == FREE:
+        s.roomy[at] = 1
+        s.roomed[s.used[1]] = at
+        s.used[1] += 1
     return found
 
 
 @compiled
-def plate_solid(
-    s: Any,
-    x: float,
-    y: float,
-    z: float,
-    n0: float,
-    n1: float,
-    n2: float,
-    length: float,
-    rho: float,
-) -> int:
+def plate_solid(s: Space, p: Numbers, n: Numbers, length: float, rho: float) -> int:
     """The first voxel that a cylinder would meet: its flat index, FREE or OUTSIDE.
 
-    The cylinder starts at (x, y, z) and is `length` m long along (n0, n1, n2).
+    The cylinder starts at p and is `length` m long along n.
     """
-    end = z + length * n2
-    rim = rho * math.sqrt(max(1.0 - n2 * n2, 0.0))
-    out = math.sqrt(x * x + y * y)
-    far = math.sqrt((x + length * n0) ** 2 + (y + length * n1) ** 2)
-    if max(z, end) + rim <= s.depth and max(out, far) + rho <= s.channel:
+    end = along(p, length, n)
+    rim = rho * math.sqrt(max(1.0 - n[2] * n[2], 0.0))
+    out = math.sqrt(p[0] * p[0] + p[1] * p[1])
+    far = math.sqrt(end[0] * end[0] + end[1] * end[1])
+    if max(p[2], end[2]) + rim <= s.depth and max(out, far) + rho <= s.channel:
         return FREE
-    half = length / 2
-    u, v, w = in_voxels(s, x + half * n0, y + half * n1, z + half * n2)
-    r, h = rho / s.spacing, half / s.spacing
-    du = h * abs(n0) + r * math.sqrt(max(1.0 - n0 * n0, 0.0))
-    dv = h * abs(n1) + r * math.sqrt(max(1.0 - n1 * n1, 0.0))
-    dw = h * abs(n2) + r * math.sqrt(max(1.0 - n2 * n2, 0.0))
-    if not on_grid(s, u, v, w, du, dv, dw):
+    u = in_voxels(s, along(p, length / 2, n))
+    r, h = rho / s.spacing, length / 2 / s.spacing
+    half = (
+        h * abs(n[0]) + r * math.sqrt(max(1.0 - n[0] * n[0], 0.0)),
+        h * abs(n[1]) + r * math.sqrt(max(1.0 - n[1] * n[1], 0.0)),
+        h * abs(n[2]) + r * math.sqrt(max(1.0 - n[2] * n[2], 0.0)),
+    )
+    if not on_grid(s, u, half):
         return OUTSIDE
     _, ny, nz = s.size
-    for a in range(math.ceil(u - du), math.floor(u + du) + 1):
-        for b in range(math.ceil(v - dv), math.floor(v + dv) + 1):
+    for a in range(math.ceil(u[0] - half[0]), math.floor(u[0] + half[0]) + 1):
+        for b in range(math.ceil(u[1] - half[1]), math.floor(u[1] + half[1]) + 1):
             row = (a * ny + b) * nz
-            for c in range(math.ceil(w - dw), math.floor(w + dw) + 1):
+            for c in range(math.ceil(u[2] - half[2]), math.floor(u[2] + half[2]) + 1):
                 if s.tau[row + c] == SOLID:
-                    e0, e1, e2 = a - u, b - v, c - w
-                    along = e0 * n0 + e1 * n1 + e2 * n2
-                    across = e0 * e0 + e1 * e1 + e2 * e2 - along * along
-                    if abs(along) <= h and across <= r * r:
+                    d = sub((a, b, c), u)
+                    axial = dot(d, n)
+                    if abs(axial) <= h and dot(d, d) - axial * axial <= r * r:
                         return row + c
     return FREE
 
 
 @compiled
-def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
+def first_forbidden(s: Space, p: Numbers, rho: float) -> int:
     """The first voxel of a ball where the tool may not be, FREE or OUTSIDE."""
-    if in_channel(s, x, y, z, rho):
+    if in_channel(s, p, rho):
         return FREE
-    u, v, w = in_voxels(s, x, y, z)
+    u = in_voxels(s, p)
     r = rho / s.spacing
-    at = voxel_of(s, x, y, z)
-    if at >= 0:
-        _, ny, nz = s.size
-        i, j, k = at // (ny * nz), at // nz % ny, at % nz
-        off = math.sqrt((u - i) ** 2 + (v - j) ** 2 + (w - k) ** 2)
-        if s.inside[at] - off > r:
-            return FREE
-    if not on_grid(s, u, v, w, r, r, r):
+    at = voxel_of(s, p)
+    if at >= 0 and s.inside[at] - norm(sub(u, cell(s, at))) > r:
+        return FREE
+    if not on_grid(s, u, (r, r, r)):
         return OUTSIDE
-    for a in range(*span(u, r, s.size[0])):
-        left = r * r - (a - u) ** 2
-        for b in range(*span(v, r, s.size[1])):
-            first, last = row_span(s, v, w, left, a, b)
+    for a in range(*span(u[0], r, s.size[0])):
+        left = r * r - (a - u[0]) ** 2
+        for b in range(*span(u[1], r, s.size[1])):
+            first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.allowed[c] == 0:
                     return c
@@ -245,15 +232,15 @@ def first_forbidden(s: Any, x: float, y: float, z: float, rho: float) -> int:
 
 
 @compiled
-def count_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
+def count_solid(s: Space, p: Numbers, rho: float) -> int:
     """How many voxels of a ball are still solid."""
-    u, v, w = in_voxels(s, x, y, z)
+    u = in_voxels(s, p)
     r = rho / s.spacing
     count = 0
-    for a in range(*span(u, r, s.size[0])):
-        left = r * r - (a - u) ** 2
-        for b in range(*span(v, r, s.size[1])):
-            first, last = row_span(s, v, w, left, a, b)
+    for a in range(*span(u[0], r, s.size[0])):
+        left = r * r - (a - u[0]) ** 2
+        for b in range(*span(u[1], r, s.size[1])):
+            first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.tau[c] == SOLID:
                     count += 1
@@ -261,14 +248,14 @@ def count_solid(s: Any, x: float, y: float, z: float, rho: float) -> int:
 
 
 @compiled
-def stamp(s: Any, x: float, y: float, z: float, rho: float, time: int) -> None:
+def stamp(s: Space, p: Numbers, rho: float, time: int) -> None:
     """Frees what of a ball is still solid, at a time."""
-    u, v, w = in_voxels(s, x, y, z)
+    u = in_voxels(s, p)
     r = rho / s.spacing
-    for a in range(*span(u, r, s.size[0])):
-        left = r * r - (a - u) ** 2
-        for b in range(*span(v, r, s.size[1])):
-            first, last = row_span(s, v, w, left, a, b)
+    for a in range(*span(u[0], r, s.size[0])):
+        left = r * r - (a - u[0]) ** 2
+        for b in range(*span(u[1], r, s.size[1])):
+            first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.tau[c] == SOLID:
                     s.tau[c] = time
@@ -277,7 +264,7 @@ def stamp(s: Any, x: float, y: float, z: float, rho: float, time: int) -> None:
 
 
 @compiled
-def roll_back(s: Any, freed: int, roomed: int) -> None:
+def roll_back(s: Space, freed: int, roomed: int) -> None:
     """Undoes all that the journals hold beyond these many entries."""
     for n in range(freed, s.used[0]):
         s.tau[s.freed[n]] = SOLID
@@ -288,32 +275,30 @@ def roll_back(s: Any, freed: int, roomed: int) -> None:
 
 @compiled
 def nearest_in_ball(
-    s: Any, which: int, x: float, y: float, z: float, rho: float
-) -> Any:
+    s: Space, forbidden: bool, p: Numbers, rho: float
+) -> tuple[int, float]:
     """The voxel in a ball's way that is nearest to its centre.
 
     Args:
         s: The space.
-        which: 0 for solid voxels, 1 for voxels the tool may not be in.
-        x: Centre in m.
-        y: Centre.
-        z: Centre.
-        rho: Radius in m.
+        forbidden: Whether voxels the tool may not be in are meant, not solid ones.
+        p: Its centre in m.
+        rho: Its radius in m.
 
     Returns:
         Its flat index, or OUTSIDE, and its distance from the centre in m.
     """
     best, found = math.inf, OUTSIDE
-    u, v, w = in_voxels(s, x, y, z)
+    u = in_voxels(s, p)
     r = max(rho / s.spacing, 0.87)
     nx, ny, nz = s.size
-    for a in range(*span(u, r, nx)):
-        for b in range(*span(v, r, ny)):
-            for c in range(*span(w, r, nz)):
+    for a in range(*span(u[0], r, nx)):
+        for b in range(*span(u[1], r, ny)):
+            for c in range(*span(u[2], r, nz)):
                 at = (a * ny + b) * nz + c
-                wrong = s.tau[at] == SOLID if which == 0 else s.allowed[at] == 0
+                wrong = s.allowed[at] == 0 if forbidden else s.tau[at] == SOLID
                 if wrong:
-                    d = math.sqrt((a - u) ** 2 + (b - v) ** 2 + (c - w) ** 2)
+                    d = norm(sub((a, b, c), u))
                     if d <= r and d < best:
                         best, found = d, at
     return found, best * s.spacing

@@ -3,21 +3,24 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, corners
+from plants.snake.signals import REST, Posture
+from plants.snake.snake_body import CULPRIT, OK, Body, between, body_of, check_body
 from plants.tissue.execution import Execution
 from plants.tissue.labels import CHANNEL, TUMOUR
-from plants.tissue.space import SOLID, Space, stamp
+from plants.tissue.space import SOLID, Space, in_voxels, stamp
 from plants.tissue.volume import Volume
 from systems.common.block import Block
-from systems.common.compiled import compiled
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import along, norm, sub, xyz
 from systems.common.parameter import check, parameter
-from systems.resection.wires.resection_ik import universal
+from systems.common.signal import Field, flat
 
 
 @dataclass
@@ -34,10 +37,38 @@ class TissueCarverParams:
     )
 
 
+class Moves(NamedTuple):
+    """How many moves were carved."""
+
+    number: Annotated[float, Field("1", "of them", 0.0)]
+
+
+class Removed(NamedTuple):
+    """What tissue is gone."""
+
+    tumour: Annotated[float, Field("m3", "of the tumour", 0.0)]
+    healthy: Annotated[float, Field("m3", "of any other", 0.0)]
+
+
+class Touched(NamedTuple):
+    """What robot and tool came near to."""
+
+    hits: Annotated[float, Field("1", "checks that found the body in tissue", 0.0)]
+    critical_distance: Annotated[
+        float, Field("m", "least to what is critical, -1 if nothing is", -1.0)
+    ]
+
+
+class Way(NamedTuple):
+    """How far the tool went."""
+
+    length: Annotated[float, Field("m", "of its path", 0.0)]
+
+
 @compiled
 def carve(
-    s: Any,
-    b: Any,
+    s: Space,
+    b: Body,
     labels: Any,
     critical: Any,
     x0: Any,
@@ -62,23 +93,20 @@ def carve(
         least distance in m of tool or body to what is critical, and the tool's way
         in m.
     """
-    c, x, why = np.empty((8, 3)), np.empty(7), np.empty(CULPRIT)
+    c, x, why = np.empty((POINTS, 3)), np.empty(7), np.empty(CULPRIT)
     corners(x0, b.h, b.tool, c)
-    p = c[7].copy()
+    p = xyz(c[7], 0)
     corners(x1, b.h, b.tool, c)
-    way = math.sqrt(
-        (c[7, 0] - p[0]) ** 2 + (c[7, 1] - p[1]) ** 2 + (c[7, 2] - p[2]) ** 2
-    )
+    way = norm(sub(c[7], p))
     steps = max(1, math.ceil(way / pitch))
     tumour, healthy, hits = 0, 0, 0
     nearest = math.inf
     for n in range(1, steps + 1):
-        for r in range(7):
-            x[r] = x0[r] + n / steps * (x1[r] - x0[r])
+        between(x0, x1, n / steps, x)
         corners(x, b.h, b.tool, c)
         hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
-        stamp(s, c[7, 0], c[7, 1], c[7, 2], b.radius, time)
+        stamp(s, c[7], b.radius, time)
         for m in range(first, s.used[0]):
             if labels[s.freed[m]] == TUMOUR:
                 tumour += 1
@@ -86,23 +114,18 @@ def carve(
                 healthy += 1
         s.used[0] = 0  # nothing here is ever rolled back by journal
         if len(critical):
-            for link in range(1, 8):
+            for link in range(6):
                 for part in range(4):
-                    share = part / 4 if link < 7 else 1.0
-                    q0 = c[link - 1, 0] + share * (c[link, 0] - c[link - 1, 0])
-                    q1 = c[link - 1, 1] + share * (c[link, 1] - c[link - 1, 1])
-                    q2 = c[link - 1, 2] + share * (c[link, 2] - c[link - 1, 2])
-                    d = interpolated(s, critical, q0, q1, q2)
-                    nearest = min(nearest, d - (b.radius if link == 7 else b.body))
+                    q = along(c[link], part / 4, sub(c[link + 1], c[link]))
+                    nearest = min(nearest, interpolated(s, critical, q) - b.body)
+            nearest = min(nearest, interpolated(s, critical, c[7]) - b.radius)
     return tumour, healthy, hits, nearest, way
 
 
 @compiled
-def interpolated(s: Any, field: Any, x: float, y: float, z: float) -> float:
+def interpolated(s: Space, field: Any, p: Numbers) -> float:
     """A field's value at a point, linear between voxels; infinite off the grid."""
-    u = (x - s.origin[0]) / s.spacing
-    v = (y - s.origin[1]) / s.spacing
-    w = (z - s.origin[2]) / s.spacing
+    u, v, w = in_voxels(s, p)
     nx, ny, nz = s.size
     i, j, k = math.floor(u), math.floor(v), math.floor(w)
     if i < 0 or j < 0 or k < 0 or i + 1 >= nx or j + 1 >= ny or k + 1 >= nz:
@@ -172,17 +195,11 @@ class TissueCarver(Block):
     State is the index of the carved moves, the posture there, and the counts; the
     voxels are a memo of it (`Carving`).
 
-    Port ``posture`` accepts s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7), the
-    snake's true posture.
-
-    Port ``index`` emits how many moves were carved (1).
-
-    Port ``removed`` emits tumour and other tissue removed [m3] (2).
-
-    Port ``touched`` emits how many checks found the body in tissue, and the least
-    distance of robot and tool to what is critical so far [m], -1 if nothing is (2).
-
-    Port ``way`` emits how far the tool went [m] (1).
+    Port ``posture`` accepts the snake's true `Posture`.
+    Port ``index`` emits how many `Moves` were carved.
+    Port ``removed`` emits the tissue `Removed`.
+    Port ``touched`` emits what was `Touched`.
+    Port ``way`` emits the tool's `Way`.
     """
 
     def __init__(
@@ -190,7 +207,7 @@ class TissueCarver(Block):
         params: TissueCarverParams | None = None,
         snake: SnakeParams | None = None,
         carving: Carving | None = None,
-        posture: Sequence[float] = (0.0,) * 7,
+        posture: Sequence[float] = REST,
     ) -> None:
         """Makes the block for tissue, a small block of tumour if None."""
         super().__init__()
@@ -198,13 +215,13 @@ class TissueCarver(Block):
         snake = check(snake or SnakeParams())
         self.carving = carving or Carving(_example_volume(), snake)
         self._voxel = self.carving.volume.voxel
-        self._posture = self.vector_in("posture", [0.0] * 7)
+        self._posture = self.signal_in("posture", Posture)
         done = self.carving.done
-        self.state_out("index", [done.index])
-        self.state_out("removed", done.removed)
-        self.state_out("touched", done.touched)
-        self.state_out("way", [done.way])
-        self._at = self.DeclareDiscreteState(universal(posture))
+        self.state_out("index", Moves, flat(Moves(float(done.index))))
+        self.state_out("removed", Removed, flat(done.removed))
+        self.state_out("touched", Touched, flat(done.touched))
+        self.state_out("way", Way, flat(Way(done.way)))
+        self.DeclareDiscreteState([*posture])  # where the snake was
         self.update_every(self._params.period, self._update)
 
     def execution(self, context: Any, posture: int) -> Execution:
@@ -214,39 +231,43 @@ class TissueCarver(Block):
             context: The block's.
             posture: Index of the plan's posture last reached.
         """
-        index, removed, touched, way = (
-            context.get_discrete_state(group).value().tolist() for group in range(4)
-        )
+        (index,), removed, touched, (way,), _ = self._state(context)
+        tumour, healthy = removed
+        hits, nearest = touched
         return Execution(
             posture,
             self.carving.done.time + context.get_time(),
-            int(index[0]),
-            (removed[0], removed[1]),
-            (touched[0], touched[1]),
-            way[0],
+            int(index),
+            (tumour, healthy),
+            (hits, nearest),
+            way,
             self.carving.volume.tau,
         )
 
-    def _update(self, context: Any) -> Sequence[Sequence[float]]:
-        state = [
-            context.get_discrete_state(group).value().tolist() for group in range(5)
-        ]
-        index, removed, touched, way, x0 = state
-        x1 = universal(self._posture.Eval(context).tolist())
+    def _state(self, context: Any) -> list[list[float]]:
+        groups = range(context.num_discrete_state_groups())
+        return [context.get_discrete_state(i).value().tolist() for i in groups]
+
+    def _update(self, context: Any) -> Sequence[Any]:
+        (index,), removed, touched, (way,), before = self._state(context)
+        x = self._posture.Eval(context)
         tumour, healthy, hits, nearest, moved = self.carving.move(
-            int(index[0]), np.array(x0), np.array(x1), self._params.pitch
+            int(index), np.array(before), x, self._params.pitch
         )
+        so_far = Touched(*touched)
         if math.isfinite(nearest):
             nearest = max(nearest, 0.0)
-            nearest = nearest if touched[1] < 0.0 else min(nearest, touched[1])
+            if so_far.critical_distance >= 0.0:
+                nearest = min(nearest, so_far.critical_distance)
         else:
-            nearest = touched[1]
+            nearest = so_far.critical_distance
+        gone = Removed(*removed)
         return (
-            [index[0] + 1.0],
-            [removed[0] + tumour * self._voxel, removed[1] + healthy * self._voxel],
-            [touched[0] + hits, nearest],
-            [way[0] + moved],
-            x1,
+            [index + 1.0],
+            [gone.tumour + tumour * self._voxel, gone.healthy + healthy * self._voxel],
+            [so_far.hits + hits, nearest],
+            [way + moved],
+            x,
         )
 
 

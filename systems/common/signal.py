@@ -148,12 +148,18 @@ def view(signal: Any, array: np.ndarray) -> Any:
     if isinstance(signal, Many):
         rows = (*array.shape[:-1], len(signal.names), size(signal.signal))
         return view(signal.signal, array.reshape(rows))
-    parts, first = [], 0
+    return signal(*[array[..., part] for part in _parts(signal)])
+
+
+@cache
+def _parts(signal: Any) -> list[int | slice]:
+    """Where in an array of a signal's elements its fields are."""
+    parts: list[int | slice] = []
+    first = 0
     for field in fields(signal).values():
-        last = first + field.size
-        parts.append(array[..., first if field.is_number else slice(first, last)])
-        first = last
-    return signal(*parts)
+        parts.append(first if field.is_number else slice(first, first + field.size))
+        first += field.size
+    return parts
 
 
 def reading(signal: Any, array: str, first: int = 0) -> str:

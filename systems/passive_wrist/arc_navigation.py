@@ -16,9 +16,12 @@ from typing import Any, NamedTuple
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import across, along, cross, norm, over, scaled, sub
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import vector
+from systems.common.signal import finiteness, vector
 from systems.common.signals import Permission, Point, ToolMotion
 from systems.common.step_block import StepBlock
+
+_STILL = (0.0, 0.0, 0.0)
+finite_permission, finite_point = finiteness(Permission), finiteness(Point)
 
 
 @dataclass
@@ -66,8 +69,10 @@ def _swing(
     fulcrum: Point,
     permission: Permission,
 ) -> tuple[ToolMotion, Script]:
-    pace = permission.speed_scale
     tip = along(tool.tip, time - tool.time, tool.v)
+    if not (finite_point(fulcrum) and finite_permission(permission)):  # hold still
+        return ToolMotion(tip, tool.u, _STILL, _STILL, time), script
+    pace = permission.speed_scale
     done = script.done + (pace * params.period if time >= params.start else 0.0)
     away = sub(tip, fulcrum.p)
     v = scaled(pace * rate(params, done), cross(params.direction, away))
@@ -97,9 +102,9 @@ class ArcNavigation(StepBlock):
         params = params or ArcParams()
         check(params, "arcs")
         axis = vector(params.axis)
-        tip, still = vector(p_WP), (0.0, 0.0, 0.0)
-        away = sub(tip, vector(p_WG))
-        tool = ToolMotion(tip, over(away, norm(away)), still, still, 0.0)
+        away = sub(vector(p_WP), vector(p_WG))
+        u = over(away, norm(away))
+        tool = ToolMotion(vector(p_WP), u, _STILL, _STILL, 0.0)
         self.declare_update(
             _swing,
             [packed(params, direction=over(axis, norm(axis)))],

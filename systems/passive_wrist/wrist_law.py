@@ -140,7 +140,10 @@ _LOADED, _SENSOR_LOST = float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST)
 _PROBING = float(Stop.PROBING)
 _STILL = (0.0, 0.0, 0.0)
 Floats = np.ndarray
+finite_fulcrum = finiteness(Fulcrum)
 finite_motion = finiteness(ToolMotion)
+finite_point = finiteness(MovingPoint)
+finite_shaft = finiteness(ShaftMotion)
 finite_velocity = finiteness(Velocity)
 finite_wrench = finiteness(Wrench)
 
@@ -264,7 +267,7 @@ def next_state(
     estimate: Fulcrum,
     seen: MovingPoint,
 ) -> Floats:
-    """The law's next state.
+    """The law's next state; what is not a number counts as a sensor that is silent.
 
     Args:
         c: A record of `constants`.
@@ -281,12 +284,15 @@ def next_state(
     p_WP, v_WP = xyz(s, TIP), _STILL  # hold still without a number
     if finite_motion(wanted):
         p_WP, v_WP = along(wanted.tip, time - wanted.time, wanted.v), wanted.v
-    valid = wrench.valid > 0.5 and finite_wrench(wrench)
+    is_told = finite_shaft(shaft) and finite_fulcrum(estimate) and finite_point(seen)
+    valid = is_told and wrench.valid > 0.5 and finite_wrench(wrench)
     u, f = shaft.u, wrench.f if valid else _STILL
-    force = sqrt(max(dot(f, f) - dot(f, u) ** 2, 0.0))
+    force = sqrt(max(dot(f, f) - dot(f, u) ** 2, 0.0)) if valid else 0.0
     _watch(s, c, force, valid)
     target, velocity = along(seen.p, c.horizon, seen.v), seen.v
-    if c.code == _OFF:
+    if not is_told:
+        target, velocity = xyz(s, PIVOT), _STILL
+    elif c.code == _OFF:
         target, velocity = xyz(c.first, 0), _STILL
     elif c.code == _SPRING:
         target, velocity = _spring(s, c, shaft, f, valid), _STILL
@@ -300,7 +306,7 @@ def next_state(
         _put(s, TIP, p_WP)
     else:
         reach = norm(sub(p_WP, xyz(s, PIVOT)))
-        length = norm(sub(p_WP, shaft.p))
+        length = norm(sub(p_WP, shaft.p)) if is_told else reach
         ratio = max(reach / max(length, 1e-3), 0.1)
         _move_pivot(s, c, target, velocity, ratio)
     if s[FROZEN] == 0.0:
@@ -310,7 +316,7 @@ def next_state(
         _put(s, TIP, plus(tip, limited(sub(p_WP, tip), step)))
     probing = s[PROBE] != PROBE_OFF and s[DONE] == 0.0
     s[SCALE] = 1.0
-    if s[FROZEN] != 0.0 or (c.code == _PWE and probing):
+    if s[FROZEN] != 0.0 or not is_told or (c.code == _PWE and probing):
         s[SCALE] = 0.0
     elif c.code == _PWE:
         across_it = estimate.sigma_across / c.sure_across

@@ -28,7 +28,7 @@ from systems.common.signal import (
 )
 from systems.common.signals import Shaft, TrackedShaft
 
-TOOLS = ("S", "O")
+TOOLS = ("target", "obstacle")
 NEVER = -1.0  # s, the frame time before the first frame
 
 
@@ -187,14 +187,14 @@ class OpticalTracker(Block):
     invalid. Noise is white; a real tracker's has a slow part as well, which no filter
     removes and which is left out here.
 
-    Ports ``S`` and ``O``, or of whatever names the tools have, accept the tools' true
-    `Shaft`.
+    Ports ``target`` and ``obstacle``, or of whatever names the tools have, accept the
+    tools' true `Shaft`.
     Port ``noise`` accepts the `MarkerNoise` of one tool after the other, renewed every
     period. It is declared as Drake's Gaussian random input:
     `AddRandomInputs(params.period, builder)`, or a `RandomSource` of that period,
     feeds it, and `SetRandomContext` seeds it; zeros give a tracker without noise.
-    Ports ``S_measured`` and ``O_measured``, likewise, emit the tools' last delivered
-    frame, a `TrackedShaft`.
+    Ports ``target_measured`` and ``obstacle_measured``, likewise, emit the tools' last
+    delivered frame, a `TrackedShaft`.
     """
 
     def __init__(

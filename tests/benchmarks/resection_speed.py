@@ -32,8 +32,7 @@ def random_procedure(session: Session, rng: np.random.Generator) -> Procedure:
     """One of 12 mm, rings 3 mm apart, somewhere the tool has been."""
     x = session.postures[rng.integers(len(session.postures))].copy()
     x[1:5] += rng.normal(size=4) * 0.05
-    p, n = np.empty(3), np.empty(3)
-    intermediate(session.body, x, p, n)
+    p, n = map(np.array, intermediate(session.body, x))
     ahead = session.params.straight_module + session.params.tool_offset
     position = (p + ahead * n / np.linalg.norm(n)).tolist()
     radius = float(rng.uniform(0.008, 0.016))

@@ -26,14 +26,14 @@ from pydrake.trajectories import PiecewisePolynomial
 from diagrams.common.run import simulate
 from diagrams.snake.scenario import ELASTIC_STEP
 from diagrams.studies import load_scenario
-from plants.snake.actuation import bends_of_lengths, wire_lengths
+from plants.snake.actuation import angles_of_lengths, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.inverse_kinematics import positioning, tool_postures
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
 from plants.snake.tension import tensions
-from systems.resection.wires.resection_ik import universal
 from systems.resection.wires.tip_reference import reference
 from tests.benchmarks.snake_mujoco import model_xml
 
@@ -59,18 +59,19 @@ def kinematics(seed: int) -> list[tuple[str, float, float, str]]:
     """(what, figure, target, unit) of the kinematics and the actuation."""
     rng = np.random.default_rng(seed)
     count = 200_000
-    q = np.zeros((count, 7))
-    q[:, 0] = rng.uniform(*PARAMS.travel, count)
-    q[:, 1::2] = rng.uniform(-np.pi, np.pi, (count, 3))
-    q[:, 2::2] = rng.uniform(0.0, PARAMS.max_bend, (count, 3))
-    L = wire_lengths(q, PARAMS)
-    straight = q.copy()
+    bends = np.zeros((count, 7))
+    bends[:, 0] = rng.uniform(*PARAMS.travel, count)
+    bends[:, 1::2] = rng.uniform(-np.pi, np.pi, (count, 3))
+    bends[:, 2::2] = rng.uniform(0.0, PARAMS.max_bend, (count, 3))
+    x = posture_of(bends)
+    L = wire_lengths(x, PARAMS)
+    straight = x.copy()
     straight[:, 5:] = 0.0
     X = forward(straight, PARAMS)
     n = np.ascontiguousarray(X[:, :3, 2])
     p = X[:, :3, 3] - (PARAMS.straight_module + PARAMS.tool_offset) * n
     assert positioning(p, n, PARAMS).reached.all()
-    bends_of_lengths(L, PARAMS)
+    angles_of_lengths(L, PARAMS)
 
     def scalar() -> None:
         for i in range(200):
@@ -79,19 +80,19 @@ def kinematics(seed: int) -> list[tuple[str, float, float, str]]:
     return [
         (
             "forward kinematics",
-            count / best(lambda: forward(q, PARAMS)),
+            count / best(lambda: forward(x, PARAMS)),
             2e6,
             "poses/s",
         ),
         (
             "wire lengths",
-            3 * count / best(lambda: wire_lengths(q, PARAMS)),
+            3 * count / best(lambda: wire_lengths(x, PARAMS)),
             0.0,
             "modules/s",
         ),
         (
             "forward actuation",
-            3 * count / best(lambda: bends_of_lengths(L, PARAMS)),
+            3 * count / best(lambda: angles_of_lengths(L, PARAMS)),
             3e6,
             "modules/s",
         ),
@@ -125,8 +126,8 @@ def circle() -> Circle:
     tip = load_scenario("snake_circle").tip
     time = np.arange(0.0, DURATION + 0.1, 2e-3)
     poses = np.array([reference(tip, t) for t in time])
-    q = tool_postures(poses[:, :3], poses[:, 3:6], poses[:, 6:], PARAMS).q
-    return Circle(time, np.array([universal(row) for row in q.tolist()]), poses[:, :3])
+    x = tool_postures(poses[:, :3], poses[:, 3:6], poses[:, 6:], PARAMS).x
+    return Circle(time, x, poses[:, :3])
 
 
 @dataclass

@@ -5,8 +5,8 @@ import pytest
 from tests.golden import differences, figures, golden
 
 GOLDEN = golden()
-LONG = {"resect_paper", "snake_wire_break"}
-"""Scenarios that no other test runs to their end."""
+LONG = {"resect_auto_small", "resect_paper", "resect_refused", "snake_wire_break"}
+"""Rows that no other test needs."""
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def make_scene() -> Callable[..., Scene]:
         for instance in (abdomen.wall_instance, abdomen.sleeve_instance):
             hold_still(builder, plant, instance)
         tools = add_posed_tools(builder, scene_graph, plant)
-        for name, fulcrum in zip("SOC", tools.params.fulcrums, strict=True):
+        for name, fulcrum in zip(tools.shafts, tools.params.fulcrums, strict=True):
             shaft = (tool_shafts or {}).get(
                 name, [fulcrum[0], fulcrum[1], -0.05, *DOWN]
             )

@@ -113,11 +113,7 @@ def check_reach(
     except ValueError as error:
         widest = float(meridian(params.max_bend, params)[0]) + params.tool_radius
         return refused(LIMIT, start, procedure.radius - widest, str(error))
-    n = procedure.axis()
-    O2 = (
-        volume_starts(procedure, start)
-        - (params.straight_module + params.tool_offset) * n
-    )
+    n, O2 = procedure.axis(), intermediate_positions(procedure, start, params)
     answers = positioning(O2, n, params)
     if answers.reached.all():
         return None
@@ -151,10 +147,7 @@ def tips_of(procedure: Procedure, start: np.ndarray, params: SnakeParams) -> np.
     e = np.cross(n, [1.0, 0.0, 0.0] if abs(n[0]) < 0.7 else [0.0, 1.0, 0.0])
     e /= np.linalg.norm(e)
     f = np.cross(n, e)
-    O2 = (
-        volume_starts(procedure, start)
-        - (params.straight_module + params.tool_offset) * n
-    )
+    O2 = intermediate_positions(procedure, start, params)
     r, z = meridian(np.linspace(0.0, widest_bend(procedure, params), 24), params)
     turn = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
     ring = np.cos(turn)[:, None] * e + np.sin(turn)[:, None] * f
@@ -197,9 +190,7 @@ def explain(
     if status not in (BODY, TOOL):
         return refused(LIMIT, why[1:4], 0.0, f"beyond a limit at {place(why[1:4])}")
     part = PARTS[int(why[0])]
-    voxel, distance = nearest_in_ball(
-        volume.space(), int(status == TOOL), why[1], why[2], why[3], why[4]
-    )
+    voxel, distance = nearest_in_ball(volume.space(), status == TOOL, why[1:4], why[4])
     at = int(voxel) if voxel != OUTSIDE else int(why[5])
     gap = max(float(why[4]) - distance, 0.0) if math.isfinite(distance) else 0.0
     if int(why[0]) == PLATE:

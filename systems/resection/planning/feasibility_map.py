@@ -92,7 +92,7 @@ def feasibility_map(
     gained, reasons = np.zeros(len(points)), []
     x = np.empty(7)
     for n, p in enumerate(points):
-        nearest_nodes(tree, p[0], p[1], p[2], found, far)
+        nearest_nodes(tree, p, found, far)
         reason = LIMIT
         for node, turn in product(found[found >= 0], TURNS):
             if not straightened(body, tree.x[node], p, turn, x):

@@ -11,12 +11,29 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.inverse_kernels import solve_tools
-from plants.snake.snake_body import corners, drive_far
-from plants.tissue.space import FREE, SOLID, count_solid, first_forbidden, roll_back
-from systems.common.compiled import compiled
+from plants.snake.inverse_kernels import REACHED, solve_tool
+from plants.snake.kinematics import POINTS, corners, link_axis
+from plants.snake.snake_body import Body, drive_far
+from plants.tissue.space import (
+    FREE,
+    SOLID,
+    Space,
+    centre,
+    count_solid,
+    first_forbidden,
+    roll_back,
+)
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, along, dot, sub, unit
 from systems.resection.planning.draws import Draws, below, normal, uniform
-from systems.resection.planning.tree import add_node, extend, nearest_nodes, visit
+from systems.resection.planning.tree import (
+    Tree,
+    add_node,
+    extend,
+    here,
+    nearest_nodes,
+    visit,
+)
 
 NEAR = 12
 """Nodes near the target among which a step's start is drawn."""
@@ -29,51 +46,35 @@ WAYS = 3
 
 
 @compiled
-def tilted(d: Draws, n: Any, spread: float, out: Any) -> None:
+def tilted(d: Draws, n: Numbers, spread: float) -> Vector:
     """An axis turned at random, by about `spread` rad in either direction."""
-    for r in range(3):
-        out[r] = n[r] + spread * normal(d)
-    size = math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
-    for r in range(3):
-        out[r] /= size
+    return unit(
+        (
+            n[0] + spread * normal(d),
+            n[1] + spread * normal(d),
+            n[2] + spread * normal(d),
+        )
+    )
 
 
 @compiled
-def centre(s: Any, voxel: int, out: Any) -> None:
-    """Where a voxel's centre lies in W, by its flat index, into out (3,)."""
-    _, ny, nz = s.size
-    out[0] = s.origin[0] + s.spacing * (voxel // (ny * nz))
-    out[1] = s.origin[1] + s.spacing * (voxel // nz % ny)
-    out[2] = s.origin[2] + s.spacing * (voxel % nz)
-
-
-@compiled
-def distance2(p: Any, q: Any) -> float:
+def distance2(p: Numbers, q: Numbers) -> float:
     """Square of the distance between two points."""
-    return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
+    d = sub(p, q)
+    return dot(d, d)
 
 
 @compiled
-def tool_posture(b: Any, p: Any, n: Any, m: Any, x: Any) -> bool:
-    """The posture with the tool at p, its axis n, intermediate axis m (1, 3 each)."""
-    q, status = np.empty((1, 7)), np.empty(1, np.int64)
-    solve_tools(p, n, m, b.h, b.tool, b.bend, np.array([b.low, b.high]), q, status)
-    if status[0] != 0:
-        return False
-    x[0] = q[0, 0]
-    for k in range(3):
-        alpha, beta = q[0, 1 + 2 * k], q[0, 2 + 2 * k]
-        sb = math.sin(beta)
-        x[1 + 2 * k] = math.atan2(-sb * math.sin(alpha), math.cos(beta))
-        x[2 + 2 * k] = math.asin(sb * math.cos(alpha))
-    return True
+def tool_posture(b: Body, p: Numbers, n: Numbers, m: Numbers, x: Any) -> bool:
+    """The posture (7,) with the tool at p, its axis n, intermediate axis m."""
+    return solve_tool(p, n, m, b.h, b.tool, b.bend, (b.low, b.high), x) == REACHED
 
 
 @compiled
 def grow(
-    s: Any,
-    b: Any,
-    t: Any,
+    s: Space,
+    b: Body,
+    t: Tree,
     draws: Draws,
     wanted: Any,
     tries: Any,
@@ -103,59 +104,50 @@ def grow(
         Steps made.
     """
     found, far = np.empty(NEAR, np.int64), np.empty(NEAR)
-    p, n, m = np.empty((1, 3)), np.empty((1, 3)), np.empty((1, 3))
-    c, x = np.empty((8, 3)), np.empty(7)
-    v, d, zero = np.empty(3), np.empty(3), np.zeros(3)
+    c, x = np.empty((POINTS, 3)), np.empty(7)
     made = 0
     for _ in range(attempts):
         # Of a few voxels drawn the one asked for least, and in a plan the nearest.
         pick, least_far = -1, math.inf
-        here = t.route[t.size[1] - 1]
+        at_node = here(t)
         for _ in range(6):
             at = below(draws, len(wanted))
             if s.tau[wanted[at]] != SOLID or tries[at] >= weary:
                 continue
             away = 1.0 + tries[at]
             if moving:
-                centre(s, wanted[at], v)
-                away *= distance2(v, t.tip[here])
+                away *= distance2(centre(s, wanted[at]), t.tip[at_node])
             if away < least_far:
                 pick, least_far = at, away
         if pick < 0:
             continue
-        voxel = wanted[pick]
-        centre(s, voxel, v)
+        v = centre(s, wanted[pick])
         # Of some places that hold the voxel the one where most is left.
-        most = 0
+        most, p = 0, v
         for _ in range(PLACES):
-            tilted(draws, zero, 1.0, d)
-            r = b.radius * uniform(draws) ** (1 / 3)
-            q0, q1, q2 = v[0] + r * d[0], v[1] + r * d[1], v[2] + r * d[2]
-            if first_forbidden(s, q0, q1, q2, b.radius) == FREE:
-                there = count_solid(s, q0, q1, q2, b.frees)
+            d = tilted(draws, (0.0, 0.0, 0.0), 1.0)
+            q = along(v, b.radius * uniform(draws) ** (1 / 3), d)
+            if first_forbidden(s, q, b.radius) == FREE:
+                there = count_solid(s, q, b.frees)
                 if there > most:
-                    most = there
-                    p[0, 0], p[0, 1], p[0, 2] = q0, q1, q2
+                    most, p = there, q
         tries[pick] += 1
         if most < least:
             continue
-        nearest_nodes(t, p[0, 0], p[0, 1], p[0, 2], found, far)
+        nearest_nodes(t, p, found, far)
         if far[0] > (3 * b.radius) ** 2:
             continue  # not yet: the frontier is far from here
-        close = moving and distance2(p[0], t.tip[here]) < (3 * b.radius) ** 2
+        close = moving and distance2(p, t.tip[at_node]) < (3 * b.radius) ** 2
         for way in range(WAYS):
             node = found[int(NEAR * uniform(draws) ** 2)]
             if node < 0:
                 node = found[0]
             if way == 0 and close:
-                node = here  # from where it stands it need not go anywhere first
+                node = at_node  # from where it stands it need not go anywhere first
             corners(t.x[node], b.h, b.tool, c)
-            for r in range(3):
-                n[0, r] = (c[6, r] - c[5, r]) / (2 * b.h)
-                m[0, r] = (c[4, r] - c[3, r]) / (2 * b.h)
             spread = 0.5 * uniform(draws) ** 2
-            tilted(draws, n[0].copy(), spread, n[0])
-            tilted(draws, m[0].copy(), spread, m[0])
+            n = tilted(draws, link_axis(c, 5, b.h), spread)
+            m = tilted(draws, link_axis(c, 3, b.h), spread)
             if not tool_posture(b, p, n, m, x):
                 continue
             freed, roomed = s.used[0], s.used[1]

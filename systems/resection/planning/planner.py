@@ -221,7 +221,7 @@ class Planner:
         good: list[tuple[int, Procedure]] = []
         for _ in range(params.candidates):
             p = session.volume.centre_of(int(left[self.rng.integers(len(left))]))
-            nearest_nodes(t, p[0], p[1], p[2], found, far)
+            nearest_nodes(t, p, found, far)
             node = int(found[self.rng.integers(NEAR)])
             if node < 0:
                 continue
@@ -243,8 +243,7 @@ class Planner:
     def _procedure(self, x: NDArray[np.float64], length: float) -> Procedure:
         """The clipped procedure that starts at a posture (7,), last module straight."""
         params = self.session.params
-        p_WI, n = np.empty(3), np.empty(3)
-        intermediate(self.session.body, x, p_WI, n)
+        p_WI, n = map(np.array, intermediate(self.session.body, x))
         start = p_WI + (params.straight_module + params.tool_offset) * n
         radius = self._radius(params.max_bend)
         number = 1 + sum(step.kind == ELEMENTARY for step in self.session.steps)

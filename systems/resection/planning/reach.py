@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, corners
+from plants.snake.kinematics import POINTS, corners
+from plants.snake.snake_body import CULPRIT, OK, body_of, check_body
 from plants.tissue.labels import BRAIN, CRITICAL, NAMES, TUMOUR
 from plants.tissue.space import FREE, SOLID, first_forbidden
 from plants.tissue.volume import Volume
@@ -212,17 +213,16 @@ def _reason(
     body, s, why = body_of(session.params), volume.space(), np.zeros(CULPRIT)
     rng = np.random.default_rng(1)
     blame: Counter[str] = Counter()
-    p, n, m, x = np.empty((1, 3)), np.empty((1, 3)), np.empty((1, 3)), np.empty(7)
-    c = np.empty((8, 3))
+    x, c = np.empty(7), np.empty((POINTS, 3))
     for _ in range(400):
         offset = rng.normal(size=3)
         offset *= body.radius * rng.random() ** (1 / 3) / np.linalg.norm(offset)
-        p[0] = points[rng.integers(len(points))] + offset
-        if first_forbidden(s, p[0, 0], p[0, 1], p[0, 2], body.radius) != FREE:
+        p = points[rng.integers(len(points))] + offset
+        if first_forbidden(s, p, body.radius) != FREE:
             blame[TOO_NARROW] += 1
             continue
-        tilted(draws, np.array([0.0, 0.0, 1.0]), 0.8, n[0])
-        tilted(draws, n[0].copy(), 0.6, m[0])
+        n = tilted(draws, (0.0, 0.0, 1.0), 0.8)
+        m = tilted(draws, n, 0.6)
         if not tool_posture(body, p, n, m, x):
             blame["beyond the robot's bends"] += 1
             continue

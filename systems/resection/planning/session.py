@@ -2,15 +2,15 @@
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import CULPRIT, OK, Body, body_of, corners
+from plants.snake.snake_body import CULPRIT, OK, Body, body_of
 from plants.tissue.critical import Boxes
-from plants.tissue.space import roll_back
+from plants.tissue.space import Space, roll_back
 from plants.tissue.volume import Volume
 from systems.common.archive import read_archive, write_archive
 from systems.common.parameter import check
@@ -101,7 +101,7 @@ class Session:
         check(self.params)
         self.body: Body = body_of(self.params, self.clearance, self.accuracy)
         self.home = home_posture(self.volume, self.params)
-        c = np.empty((8, 3))
+        c = np.empty((POINTS, 3))
         corners(self.home, self.body.h, self.body.tool, c)
         self.tree: Tree = new_tree(self.home, c[7], ROOM, ROOM)
         self.why = np.zeros(CULPRIT)
@@ -225,12 +225,12 @@ class Session:
         text = f"feasible: removes {1e9 * gained:.0f} mm3 in {poses} poses"
         return Answer(True, text=text, gained=gained, poses=poses)
 
-    def _approach(self, s: Any, body: Body, x: NDArray[np.float64]) -> int:
+    def _approach(self, s: Space, body: Body, x: NDArray[np.float64]) -> int:
         """Drives to a posture from the nearest node that has a free way to it."""
-        c = np.empty((8, 3))
+        c = np.empty((POINTS, 3))
         corners(x, body.h, body.tool, c)
         found, far = np.empty(STARTS, np.int64), np.empty(STARTS)
-        nearest_nodes(self.tree, c[7, 0], c[7, 1], c[7, 2], found, far)
+        nearest_nodes(self.tree, c[7], found, far)
         blamed, best, status = None, -1.0, LIMIT
         for node in [0, *found[found >= 0].tolist()]:
             freed, roomed = int(s.used[0]), int(s.used[1])
@@ -276,7 +276,7 @@ class Session:
 
     @property
     def postures(self) -> NDArray[np.float64]:
-        """All postures of the plan in their order, (n, 7), in x coordinates."""
+        """All postures of the plan in their order, (n, 7)."""
         return self.tree.x[self.tree.route[: self.tree.size[1]]]
 
     @property

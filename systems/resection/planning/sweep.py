@@ -13,11 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.inverse_kernels import solve_positionings
-from plants.snake.snake_body import OK, corners
-from plants.tissue.space import roll_back
-from systems.common.compiled import compiled
-from systems.resection.planning.tree import extend, go_to, here, visit
+from plants.snake.inverse_kernels import REACHED, solve_positioning
+from plants.snake.kinematics import POINTS, corners, link_axis
+from plants.snake.posture import module_angles
+from plants.snake.snake_body import OK, Body
+from plants.tissue.space import Space, roll_back
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import Vector, along, norm, sub, unit, xyz
+from systems.resection.planning.tree import Tree, extend, go_to, here, visit
 
 LIMIT = 5
 """Status of a pose that the inverse kinematics does not reach."""
@@ -30,7 +33,7 @@ RINGS = 64
 
 
 @compiled
-def meridian_rate(b: Any, beta: float) -> float:
+def meridian_rate(b: Body, beta: float) -> float:
     """Rate of the tool's way along its meridian with beta, in m/rad."""
     k = 2 * b.h
     dr = k * (math.cos(beta) + 2 * math.cos(2 * beta)) + 2 * b.tool * math.cos(2 * beta)
@@ -39,7 +42,7 @@ def meridian_rate(b: Any, beta: float) -> float:
 
 
 @compiled
-def ring_bends(b: Any, widest: float, pitch: float, out: Any) -> int:
+def ring_bends(b: Body, widest: float, pitch: float, out: Any) -> int:
     """Bends of the rings up to the widest, evenly along the meridian; their number."""
     total = 0.0
     for n in range(32):
@@ -60,16 +63,13 @@ def ring_bends(b: Any, widest: float, pitch: float, out: Any) -> int:
 @compiled
 def bent(x: Any, alpha: float, beta: float, out: Any) -> None:
     """The posture x with the last module at (alpha, beta)."""
-    for r in range(5):
-        out[r] = x[r]
-    sb = math.sin(beta)
-    out[5] = math.atan2(-sb * math.sin(alpha), math.cos(beta))
-    out[6] = math.asin(sb * math.cos(alpha))
+    out[:5] = x[:5]
+    out[5], out[6] = module_angles(alpha, beta)
 
 
 @compiled
 def sweep_volume(
-    s: Any, b: Any, t: Any, widest: float, pitch: float, rigid: bool, why: Any
+    s: Space, b: Body, t: Tree, widest: float, pitch: float, rigid: bool, why: Any
 ) -> int:
     """Sweeps an elementary volume about the node at which the robot stands.
 
@@ -148,41 +148,27 @@ def sweep_volume(
 
 
 @compiled
-def intermediate(b: Any, x: Any, p: Any, n: Any) -> None:
-    """O2 and the axis there, of a posture (7,), into p (3,) and n (3,)."""
-    c = np.empty((8, 3))
-    straight = x.copy()
+def intermediate(b: Body, x: Any) -> tuple[Vector, Vector]:
+    """O2 and the axis there, of a posture (7,)."""
+    c, straight = np.empty((POINTS, 3)), x.copy()
     straight[5] = straight[6] = 0.0
     corners(straight, b.h, b.tool, c)
-    for r in range(3):
-        p[r] = c[4, r]
-        n[r] = (c[5, r] - c[4, r]) / (2 * b.h)
+    return xyz(c[4], 0), link_axis(c, 4, b.h)
 
 
 @compiled
-def posture_at(b: Any, p: Any, n: Any, x: Any) -> int:
+def posture_at(b: Body, p: Numbers, n: Numbers, x: Any) -> int:
     """The posture with O2 at p, axis n and a straight last module, into x (7,)."""
-    q, status = np.empty((1, 5)), np.empty(1, np.int64)
-    travel = np.array([b.low, b.high])
-    one, axis = p.reshape(1, 3), n.reshape(1, 3)
-    solve_positionings(one, axis, b.h, b.bend, travel, q, status)
-    if status[0] != 0:
-        return LIMIT
-    x[0] = q[0, 0]
-    for m in range(2):
-        alpha, beta = q[0, 1 + 2 * m], q[0, 2 + 2 * m]
-        sb = math.sin(beta)
-        x[1 + 2 * m] = math.atan2(-sb * math.sin(alpha), math.cos(beta))
-        x[2 + 2 * m] = math.asin(sb * math.cos(alpha))
+    status = solve_positioning(p, n, b.h, b.bend, (b.low, b.high), x)
     x[5] = x[6] = 0.0
-    return OK
+    return OK if status == REACHED else LIMIT
 
 
 @compiled
 def sweep_procedure(
-    s: Any,
-    b: Any,
-    t: Any,
+    s: Space,
+    b: Body,
+    t: Tree,
     n: Any,
     length: float,
     spacing: float,
@@ -209,15 +195,12 @@ def sweep_procedure(
         OK, or the status that ended a rigid procedure.
     """
     volumes = math.ceil(length / spacing - 1e-9) + 1
-    p, axis = np.empty(3), np.empty(3)
     centre = here(t)
-    intermediate(b, t.x[centre], p, axis)
-    x, target = np.empty(7), np.empty(3)
+    p, _ = intermediate(b, t.x[centre])
+    x = np.empty(7)
     for volume in range(volumes):
         if volume > 0:
-            along = length * volume / (volumes - 1)
-            for r in range(3):
-                target[r] = p[r] + along * n[r]
+            target = along(p, length * volume / (volumes - 1), n)
             status = posture_at(b, target, n, x)
             if status == OK:
                 go_to(s, b, t, centre, why)
@@ -226,7 +209,7 @@ def sweep_procedure(
                     status = -new
             if status != OK:
                 if status == LIMIT:
-                    why[0], why[1], why[2], why[3] = 9, target[0], target[1], target[2]
+                    why[0], why[1], why[2], why[3] = -1, *target
                 return status if rigid else OK
             centre = new
         status = sweep_volume(s, b, t, widest, pitch, rigid, why)
@@ -237,7 +220,7 @@ def sweep_procedure(
 
 
 @compiled
-def straightened(b: Any, x: Any, towards: Any, share: float, out: Any) -> bool:
+def straightened(b: Body, x: Any, towards: Any, share: float, out: Any) -> bool:
     """A start near posture x for a procedure: last module straight, axis turned.
 
     Args:
@@ -247,22 +230,17 @@ def straightened(b: Any, x: Any, towards: Any, share: float, out: Any) -> bool:
         share: How far to turn it, 0 to 1.
         out: The posture (7,).
     """
-    p, n = np.empty(3), np.empty(3)
-    intermediate(b, x, p, n)
-    d = towards - p
-    d /= max(math.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2), 1e-9)
-    n = (1.0 - share) * n + share * d
-    size = math.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)
-    if size < 1e-6:
-        return False
-    return posture_at(b, p, n / size, out) == OK
+    p, n = intermediate(b, x)
+    d, k = unit(sub(towards, p)), 1.0 - share
+    m = k * n[0] + share * d[0], k * n[1] + share * d[1], k * n[2] + share * d[2]
+    return norm(m) >= 1e-6 and posture_at(b, p, unit(m), out) == OK
 
 
 @compiled
 def try_procedure(
-    s: Any,
-    b: Any,
-    t: Any,
+    s: Space,
+    b: Body,
+    t: Tree,
     node: int,
     x: Any,
     length: float,
@@ -279,8 +257,7 @@ def try_procedure(
     visit(t, node)  # a thought needs no way there
     gain = -1
     if extend(s, b, t, node, x, why) >= 0:
-        p, n = np.empty(3), np.empty(3)
-        intermediate(b, x, p, n)
+        _, n = intermediate(b, x)
         sweep_procedure(s, b, t, n, length, spacing, widest, pitch, False, why)
         gain = s.used[0] - freed
     roll_back(s, freed, roomed)

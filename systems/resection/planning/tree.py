@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.snake_body import OK, corners, drive
-from plants.tissue.space import roll_back
-from systems.common.compiled import compiled
+from plants.snake.kinematics import POINTS, corners
+from plants.snake.snake_body import OK, Body, drive
+from plants.tissue.space import Space, roll_back
+from systems.common.compiled import Numbers, compiled
+from systems.common.geometry import dot, norm, sub
 
 DIRECT = 0.030
 """Longest way of the tool, in m, for which the straight line is tried first."""
@@ -75,13 +77,13 @@ def grown(tree: Tree, nodes: int, visits: int) -> Tree:
 
 
 @compiled
-def here(t: Any) -> int:
+def here(t: Tree) -> int:
     """The node at which the robot stands."""
     return t.route[t.size[1] - 1]
 
 
 @compiled
-def visit(t: Any, node: int) -> None:
+def visit(t: Tree, node: int) -> None:
     """Appends a node to the route."""
     if t.size[1] >= len(t.route):
         raise IndexError("the tree's route is full")
@@ -90,17 +92,14 @@ def visit(t: Any, node: int) -> None:
 
 
 @compiled
-def add_node(t: Any, b: Any, parent: int, x: Any) -> int:
+def add_node(t: Tree, b: Body, parent: int, x: Any) -> int:
     """Hangs a posture to a node; returns the new node."""
     node = t.size[0]
     if node >= len(t.x):
         raise IndexError("the tree is full")
-    c = np.empty((8, 3))
+    c = np.empty((POINTS, 3))
     corners(x, b.h, b.tool, c)
-    for r in range(7):
-        t.x[node, r] = x[r]
-    for r in range(3):
-        t.tip[node, r] = c[7, r]
+    t.x[node], t.tip[node] = x, c[7]
     t.parent[node] = parent
     t.depth[node] = t.depth[parent] + 1
     t.size[0] += 1
@@ -108,15 +107,12 @@ def add_node(t: Any, b: Any, parent: int, x: Any) -> int:
 
 
 @compiled
-def go_to(s: Any, b: Any, t: Any, node: int, why: Any) -> None:
+def go_to(s: Space, b: Body, t: Tree, node: int, why: Any) -> None:
     """Drives to a node of the tree, straight if it can be, else along the tree."""
     start = here(t)
     if node == start:
         return
-    d = 0.0
-    for r in range(3):
-        d += (t.tip[node, r] - t.tip[start, r]) ** 2
-    near = d < DIRECT * DIRECT
+    near = norm(sub(t.tip[node], t.tip[start])) < DIRECT
     if near and drive(s, b, t.x[start], t.x[node], t.size[1], why) == OK:
         visit(t, node)
         return
@@ -152,7 +148,7 @@ def go_to(s: Any, b: Any, t: Any, node: int, why: Any) -> None:
 
 
 @compiled
-def extend(s: Any, b: Any, t: Any, node: int, x: Any, why: Any) -> int:
+def extend(s: Space, b: Body, t: Tree, node: int, x: Any, why: Any) -> int:
     """Goes to a node and from there to a new posture.
 
     Returns:
@@ -176,21 +172,25 @@ def extend(s: Any, b: Any, t: Any, node: int, x: Any, why: Any) -> int:
 
 
 @compiled
-def nearest_nodes(t: Any, x: float, y: float, z: float, found: Any, far: Any) -> None:
-    """The len(found) nodes whose tools are nearest to a point, nearest first."""
+def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
+    """The len(found) nodes whose tools are nearest to a point, nearest first.
+
+    Args:
+        t: The tree.
+        p: The point.
+        found: Takes the nodes, (n,); -1 where there are no more.
+        far: Takes the squares of their distances.
+    """
     count = len(found)
     for n in range(count):
         found[n] = -1
         far[n] = math.inf
     for node in range(t.size[0]):
-        d = (
-            (t.tip[node, 0] - x) ** 2
-            + (t.tip[node, 1] - y) ** 2
-            + (t.tip[node, 2] - z) ** 2
-        )
-        if d < far[count - 1]:
+        d = sub((t.tip[node, 0], t.tip[node, 1], t.tip[node, 2]), p)
+        d2 = dot(d, d)
+        if d2 < far[count - 1]:
             n = count - 1
-            while n > 0 and far[n - 1] > d:
+            while n > 0 and far[n - 1] > d2:
                 far[n], found[n] = far[n - 1], found[n - 1]
                 n -= 1
-            far[n], found[n] = d, node
+            far[n], found[n] = d2, node

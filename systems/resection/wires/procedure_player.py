@@ -1,18 +1,24 @@
 """Procedure player: plays a plan as a smooth stream of tool poses."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from plants.snake.kinematics import frames
+from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
+from plants.snake.signals import ToolPose, ToolTarget
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
-from systems.resection.wires.resection_ik import from_universal
+from systems.common.signal import Field, flat, vector
+
+
+class Progress(NamedTuple):
+    """How far a plan has been played."""
+
+    posture: Annotated[float, Field("1", "the one last reached", 0.0)]
 
 
 @dataclass
@@ -63,12 +69,9 @@ class ProcedurePlayer(Block):
     checked. The intermediate axis goes along, so the inverse kinematics finds the
     planned posture again.
 
-    Port ``target`` emits p_WT [m], tool axis n_WT and intermediate axis n_WI,
-    channel frame W, ``lead`` ahead of time (9).
-
-    Port ``reference`` emits p_WT [m] and n_WT for this instant (6).
-
-    Port ``progress`` emits the index of the posture last reached (1).
+    Port ``target`` emits the `ToolTarget`, ``lead`` ahead of time.
+    Port ``reference`` emits the `ToolPose` of this instant.
+    Port ``progress`` emits the `Progress`.
     """
 
     def __init__(
@@ -102,9 +105,9 @@ class ProcedurePlayer(Block):
         self._first, self._x = first, self._x[first:]
         self._times = schedule(self._x, self._params)
         ticket = {self.time_ticket()}
-        self.vector_out("target", 9, self._calc_target, ticket)
-        self.vector_out("reference", 6, self._calc_reference, ticket)
-        self.vector_out("progress", 1, self._calc_progress, ticket)
+        self.signal_out("target", ToolTarget, self._calc_target, ticket)
+        self.signal_out("reference", ToolPose, self._calc_reference, ticket)
+        self.signal_out("progress", Progress, self._calc_progress, ticket)
 
     @property
     def duration(self) -> float:
@@ -116,8 +119,8 @@ class ProcedurePlayer(Block):
         """When each posture is reached in s, (n,); 0 for those played before."""
         return np.concatenate([np.zeros(self._first), self._times])
 
-    def _pose(self, time: float) -> list[float]:
-        """p_WT, n_WT, n_WI (9) at a time."""
+    def target(self, time: float) -> ToolTarget:
+        """The tool's pose at a time in s."""
         n = int(np.searchsorted(self._times, time))
         if n == 0 or n == len(self._times):
             x = self._x[min(n, len(self._x) - 1)]
@@ -125,17 +128,17 @@ class ProcedurePlayer(Block):
             before, after = self._times[n - 1], self._times[n]
             share = (time - before) / (after - before)
             x = self._x[n - 1] + share * (self._x[n] - self._x[n - 1])
-        chain = frames(from_universal(x.tolist()), self._snake)
-        n_WT = chain[3][:3, 2]
-        p_WT = chain[3][:3, 3] + self._snake.tool_offset * n_WT
-        return [*p_WT.tolist(), *n_WT.tolist(), *chain[2][:3, 2].tolist()]
+        c, h = np.empty((POINTS, 3)), self._snake.half_pitch
+        corners(x, h, self._snake.tool_offset, c)
+        return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
 
-    def _calc_target(self, context: Any) -> Sequence[float]:
-        return self._pose(context.get_time() + self._params.lead)
+    def _calc_target(self, context: Any) -> np.ndarray:
+        return flat(self.target(context.get_time() + self._params.lead))
 
-    def _calc_reference(self, context: Any) -> Sequence[float]:
-        return self._pose(context.get_time())[:6]
+    def _calc_reference(self, context: Any) -> np.ndarray:
+        target = self.target(context.get_time())
+        return flat(ToolPose(target.p, target.n))
 
-    def _calc_progress(self, context: Any) -> Sequence[float]:
+    def _calc_progress(self, context: Any) -> list[float]:
         reached = int(np.searchsorted(self._times, context.get_time() + 1e-9, "right"))
         return [float(self._first + max(reached - 1, 0))]

@@ -1,54 +1,86 @@
 """Snake location: posture and tool pose from the plant's state."""
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake import FAR, NEAR, NEAR_ANGLES, POSITIONS
+from plants.snake.posture import Array, bends_of
+from plants.snake.signals import (
+    MODULE_NUMBERS,
+    REST,
+    Numbers,
+    Posture,
+    SnakeState,
+    ToolPose,
+)
+from plants.snake.snake import FAR, NEAR, NEAR_ANGLES
 from systems.common.block import Block
 from systems.common.parameter import check
-from systems.resection.wires.resection_ik import from_universal
+from systems.common.signal import Field, flat, vector, view
+
+BEND_NAMES = [f"{name}{k}" for k in MODULE_NUMBERS for name in ("alpha", "beta")]
+
+
+class Bends(NamedTuple):
+    """A posture as the paper writes it."""
+
+    q: Annotated[
+        Numbers,
+        Field(
+            "m, rad",
+            "s, alpha1, beta1, ..., alpha3, beta3",
+            REST,
+            ("s", *BEND_NAMES),
+        ),
+    ]
+
+
+class CouplerError(NamedTuple):
+    """How well the couplers hold."""
+
+    angle: Annotated[
+        float, Field("rad", "largest between what a module's two balls do", 0.0)
+    ]
 
 
 class SnakeLocation(Block):
     """Where the snake truly is.
 
-    Port ``state`` accepts the plant's positions, then velocities, of the snake [m,
-    rad, m/s, rad/s] (26).
-
-    Port ``posture`` emits s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7).
-
-    Port ``tool`` emits p_WT [m] and the tool's axis n_WT, channel frame W (6).
-
-    Port ``coupler_error`` emits the largest angle between what the two balls of a
-    module do [rad] (1).
+    Port ``state`` accepts the plant's `SnakeState`.
+    Port ``posture`` emits the `Posture`.
+    Port ``bends`` emits it as `Bends`, to be logged.
+    Port ``tool`` emits the `ToolPose`.
+    Port ``coupler_error`` emits the `CouplerError`.
     """
 
     def __init__(self, snake: SnakeParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
         self._snake = check(snake or SnakeParams())
-        self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
+        self._state = self.signal_in("state", SnakeState)
         ticket = {self._state.ticket()}
         self._posture = self.cached("posture", self._calc_posture, ticket)
         known = {self._posture.ticket()}
-        self.vector_out("posture", 7, self._posture.Eval, known)
-        self.vector_out("tool", 6, self._calc_tool, known)
-        self.vector_out("coupler_error", 1, self._calc_coupler_error, ticket)
+        self.signal_out("posture", Posture, self._posture.Eval, known)
+        self.signal_out("bends", Bends, self._calc_bends, known)
+        self.signal_out("tool", ToolPose, self._calc_tool, known)
+        self.signal_out("coupler_error", CouplerError, self._calc_coupler_error, ticket)
 
-    def _calc_posture(self, context: Any) -> Sequence[float]:
-        x = self._state.Eval(context)
-        near = x[NEAR]
-        near[1:] = (near[1:] + x[FAR]) / 2
-        return from_universal(near.tolist())
+    def _calc_posture(self, context: Any) -> Array:
+        q = view(SnakeState, self._state.Eval(context)).q
+        x: Array = q[NEAR]
+        x[1:] = (x[1:] + q[FAR]) / 2
+        return x
 
-    def _calc_tool(self, context: Any) -> Sequence[float]:
+    def _calc_bends(self, context: Any) -> Array:
+        return bends_of(self._posture.Eval(context))
+
+    def _calc_tool(self, context: Any) -> Array:
         X_WT = forward(self._posture.Eval(context), self._snake)
-        return [*X_WT[:3, 3].tolist(), *X_WT[:3, 2].tolist()]
+        return flat(ToolPose(vector(X_WT[:3, 3]), vector(X_WT[:3, 2])))
 
-    def _calc_coupler_error(self, context: Any) -> Sequence[float]:
-        x = self._state.Eval(context)
-        return [float(np.abs(x[NEAR_ANGLES] - x[FAR]).max())]
+    def _calc_coupler_error(self, context: Any) -> list[float]:
+        q = view(SnakeState, self._state.Eval(context)).q
+        return [float(np.abs(q[NEAR_ANGLES] - q[FAR]).max())]

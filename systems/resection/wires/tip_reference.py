@@ -5,8 +5,13 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
+import numpy as np
+
+from plants.snake.signals import ToolPose, ToolTarget
 from systems.common.block import Block
+from systems.common.geometry import across, along, cross, plus, scaled, unit
 from systems.common.parameter import Rules, check, parameter, part
+from systems.common.signal import flat, vector
 
 PLACE: dict[str, Any] = {"least": -0.5, "most": 0.5, "shape": (3,)}
 DIRECTION: dict[str, Any] = {"least": -1e3, "most": 1e3, "shape": (3,)}
@@ -18,7 +23,7 @@ def is_direction(n: Sequence[float]) -> bool:
 
 
 @dataclass
-class ToolPose:
+class PoseParams:
     """A tool pose in the channel frame W, with the redundant freedoms."""
 
     p_WT: list[float] = parameter([0.0, 0.0, 0.0414], "of the tool", "m", **PLACE)
@@ -32,9 +37,10 @@ class ToolPose:
         yield is_direction(self.n_WT), "n_WT", "a direction"
         yield self.n_WI is None or is_direction(self.n_WI), "n_WI", "a direction"
 
-    def vector(self) -> list[float]:
-        """p_WT, n_WT, n_WI (9)."""
-        return [*self.p_WT, *self.n_WT, *(self.n_WI or self.n_WT)]
+    def target(self) -> ToolTarget:
+        """The pose as the blocks take it."""
+        n_WI = self.n_WT if self.n_WI is None else self.n_WI
+        return ToolTarget(vector(self.p_WT), vector(self.n_WT), vector(n_WI))
 
 
 @dataclass
@@ -66,7 +72,7 @@ class CircleParams:
 class TipReferenceParams:
     """Parameters of `TipReference`."""
 
-    poses: list[ToolPose] = parameter(
+    poses: list[PoseParams] = parameter(
         [], "poses, in turn and again; none for the circle", shape=(-1,)
     )
     dwell: float = parameter(
@@ -78,58 +84,48 @@ class TipReferenceParams:
     )
 
 
-def circle_pose(circle: CircleParams, time: float) -> list[float]:
-    """p_WT, n_WT, n_WI (9) on the circle at a time in s, at rest before 0."""
+def circle_target(circle: CircleParams, time: float) -> ToolTarget:
+    """The pose on the circle at a time in s, at rest before 0."""
     time = max(time, 0.0)
     ramp = circle.ramp
     turns = time * time / (2 * ramp) if time < ramp else time - ramp / 2
     angle = 2 * math.pi * turns / circle.period
-    nx, ny, nz = (x / math.hypot(*circle.n_WT) for x in circle.n_WT)
+    n = unit(vector(circle.n_WT))
     # Two axes across n: the world's x as far as it goes, or y.
-    ux, uy, uz = (1.0, 0.0, 0.0) if abs(nx) < 0.9 else (0.0, 1.0, 0.0)
-    along = ux * nx + uy * ny + uz * nz
-    ux, uy, uz = ux - along * nx, uy - along * ny, uz - along * nz
-    size = math.hypot(ux, uy, uz)
-    ux, uy, uz = ux / size, uy / size, uz / size
-    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
-    c, s = math.cos(angle), math.sin(angle)
-    rx, ry, rz = c * ux + s * vx, c * uy + s * vy, c * uz + s * vz
-    cl, sl = math.cos(circle.lean), math.sin(circle.lean)
-    x, y, z = circle.p_WC
-    return [
-        *(x + circle.radius * rx, y + circle.radius * ry, z + circle.radius * rz),
-        *(nx, ny, nz),
-        *(cl * nx + sl * rx, cl * ny + sl * ry, cl * nz + sl * rz),
-    ]
+    u = unit(across((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n))
+    r = plus(scaled(math.cos(angle), u), scaled(math.sin(angle), cross(n, u)))
+    leaning = plus(scaled(math.cos(circle.lean), n), scaled(math.sin(circle.lean), r))
+    return ToolTarget(along(vector(circle.p_WC), circle.radius, r), n, leaning)
 
 
-def reference(params: TipReferenceParams, time: float) -> list[float]:
-    """p_WT, n_WT, n_WI (9) at a time in s."""
+def reference(params: TipReferenceParams, time: float) -> ToolTarget:
+    """The pose at a time in s."""
     if not params.poses:
-        return circle_pose(params.circle, time)
+        return circle_target(params.circle, time)
     # An instant that rounding puts just before a change belongs after it.
     index = int(max(time, 0.0) / params.dwell + 1e-9)
-    return params.poses[index % len(params.poses)].vector()
+    return params.poses[index % len(params.poses)].target()
 
 
 class TipReference(Block):
     """The tool poses that the snake is to take.
 
-    Port ``target`` emits p_WT [m], n_WT and n_WI, channel frame W, ``lead`` ahead of
-    time, as what is commanded now is reached a period later (9).
-
-    Port ``reference`` emits p_WT [m] and n_WT for this instant (6).
+    Port ``target`` emits the `ToolTarget`, ``lead`` ahead of time, as what is commanded
+    now is reached a period later.
+    Port ``reference`` emits the `ToolPose` of this instant.
     """
 
     def __init__(self, params: TipReferenceParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
         self._params = check(params or TipReferenceParams())
-        self.vector_out("target", 9, self._calc_target, {self.time_ticket()})
-        self.vector_out("reference", 6, self._calc_reference, {self.time_ticket()})
+        ticket = {self.time_ticket()}
+        self.signal_out("target", ToolTarget, self._calc_target, ticket)
+        self.signal_out("reference", ToolPose, self._calc_reference, ticket)
 
-    def _calc_target(self, context: Any) -> Sequence[float]:
-        return reference(self._params, context.get_time() + self._params.lead)
+    def _calc_target(self, context: Any) -> np.ndarray:
+        return flat(reference(self._params, context.get_time() + self._params.lead))
 
-    def _calc_reference(self, context: Any) -> Sequence[float]:
-        return reference(self._params, context.get_time())[:6]
+    def _calc_reference(self, context: Any) -> np.ndarray:
+        target = reference(self._params, context.get_time())
+        return flat(ToolPose(target.p, target.n))

@@ -2,17 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from plants.snake.actuation import length_range, wire_lengths
-from plants.snake.parameters import SnakeParams
+from plants.snake.parameters import DRUMS, MODULES, WIRES, SnakeParams
+from plants.snake.signals import REST, DrumRates, Drums, Stopped
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
+from systems.common.signal import Field
 
-AXES = 10
-"""Nine drums and the translation."""
+
+class Limited(NamedTuple):
+    """What limits the motors."""
+
+    code: Annotated[float, Field("1", "0, 1 by a rate, 2 by a stroke", 0.0)]
 
 
 @dataclass
@@ -42,67 +48,63 @@ class WireDrums(Block):
 
     A command is reached at the end of the period in which it is given, every motor
     turning at a constant rate meanwhile. If one motor is too slow for that, all are
-    slowed by the same share, so that the wires keep matching each other. While
-    ``stop`` is not zero, or a command is not finite, all stand still.
+    slowed by the same share, so that the wires keep matching each other; beyond a
+    stroke a command is cut. While ``stop`` is not zero, or a command is not finite, all
+    stand still.
 
-    Port ``command`` accepts the lengths of wires 0 to 8 and the translation, to be
-    reached one period later [m] (10).
-
-    Port ``stop`` accepts 0, or anything else to stop (1).
-
-    Port ``lengths`` emits what is wound out at this instant [m] (10).
-
-    Port ``rates`` emits its time derivative [m/s] (10).
-
-    Port ``limited`` emits 0, 1 if a rate limit slows the motion, 2 if a command is
-    beyond a stroke and was cut (1).
+    Port ``command`` accepts the `Drums` to be reached one period later.
+    Port ``stop`` accepts whether they are `Stopped`.
+    Port ``lengths`` emits what is wound out at this instant, `Drums`.
+    Port ``rates`` emits their `DrumRates`.
+    Port ``limited`` emits whether the motion is `Limited`.
     """
 
     def __init__(
         self,
         params: WireDrumsParams | None = None,
         snake: SnakeParams | None = None,
-        lengths: Sequence[float] | None = None,
+        lengths: ArrayLike | None = None,
     ) -> None:
         """Makes the block, starting at `lengths` (10); straight at s = 0 if None."""
         super().__init__()
         self._params = check(params or WireDrumsParams())
         snake = check(snake or SnakeParams())
         low, high = length_range(snake)
-        margin = self._params.margin
-        self._low = np.append(low - margin, snake.travel[0])
-        self._high = np.append(high + margin, snake.travel[1])
-        self._most = self._params.period * np.array(
-            [self._params.wire_rate] * 9 + [self._params.travel_rate]
-        )
-        straight = [*wire_lengths(np.zeros(7), snake).tolist(), 0.0]
-        start = straight if lengths is None else [*lengths]
-        self._command = self.vector_in("command", straight)
-        self._stop = self.vector_in("stop", [0.0])
+        s_min, s_max = snake.travel
+        self._low = np.append(low - self._params.margin, s_min)
+        self._high = np.append(high + self._params.margin, s_max)
+        wires = [self._params.wire_rate] * (WIRES * MODULES)
+        self._most = self._params.period * np.array([*wires, self._params.travel_rate])
+        if lengths is None:
+            lengths = np.append(wire_lengths(REST, snake), 0.0)
+        self._command = self.signal_in("command", Drums)
+        self._stop = self.signal_in("stop", Stopped)
         # The lengths at the last update, and its instant.
-        self._start = self.DeclareDiscreteState([*start, 0.0])
-        self._rates = self.state_out("rates", [0.0] * AXES)
-        self.state_out("limited", [0.0])
-        self.vector_out(
-            "lengths", AXES, self._calc_lengths, {self.xd_ticket(), self.time_ticket()}
-        )
+        self._start = self.DeclareDiscreteState(np.array(lengths, float))
+        self._since = self.DeclareDiscreteState([0.0])
+        self._rates = self.state_out("rates", DrumRates, np.zeros(DRUMS))
+        self.state_out("limited", Limited, np.zeros(1))
+        tickets = {self.xd_ticket(), self.time_ticket()}
+        self.signal_out("lengths", Drums, self._calc_lengths, tickets)
         self.update_every(self._params.period, self._update)
 
-    def _calc_lengths(self, context: Any) -> Sequence[float]:
-        start = context.get_discrete_state(self._start).value()
-        rates = context.get_discrete_state(self._rates).value()
-        elapsed = min(context.get_time() - float(start[AXES]), self._params.period)
-        return (start[:AXES] + elapsed * rates).tolist()
+    def _calc_lengths(self, context: Any) -> np.ndarray:
+        start, (since,), rates = (
+            context.get_discrete_state(group).value()
+            for group in (self._start, self._since, self._rates)
+        )
+        elapsed = min(context.get_time() - float(since), self._params.period)
+        lengths: np.ndarray = start + elapsed * rates
+        return lengths
 
-    def _update(self, context: Any) -> Sequence[Sequence[float]]:
-        now = np.array(self._calc_lengths(context))
-        time, period = context.get_time(), self._params.period
-        command = self._command.Eval(context)
-        if self._stop.Eval(context)[0] != 0.0 or not np.isfinite(command).all():
-            return [*now, time], [0.0] * AXES, [0.0]
+    def _update(self, context: Any) -> Sequence[Any]:
+        now, command = self._calc_lengths(context), self._command.Eval(context)
+        since, (stopped,) = [context.get_time()], self._stop.Eval(context)
+        if stopped != 0.0 or not np.isfinite(command).all():
+            return now, since, np.zeros(DRUMS), [0.0]
         goal = np.minimum(np.maximum(command, self._low), self._high)
         step = goal - now
         slow = float((np.abs(step) / self._most).max())
         limited = 2.0 if (goal != command).any() else 1.0 if slow > 1.0 + 1e-9 else 0.0
-        rates = step / (period * max(slow, 1.0))
-        return [*now, time], rates.tolist(), [limited]
+        rates = step / (self._params.period * max(slow, 1.0))
+        return now, since, rates, [limited]

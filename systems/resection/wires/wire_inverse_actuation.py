@@ -1,25 +1,26 @@
 """Wire inverse actuation: the drums' positions for a posture."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from plants.snake.actuation import wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
+from plants.snake.signals import REST, Drums, Posture
 from plants.snake.tension import tensions
 from plants.snake.weight import GRAVITY, weight
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
-from systems.resection.wires.resection_ik import from_universal, universal
 
 
 @dataclass
 class WireInverseActuationParams:
     """Parameters of `WireInverseActuation`."""
 
+    period: float = parameter(0.02, "of the postures", "s", least=1e-3, most=0.1)
     # Wires are wound shorter by what they stretch.
     stiffness: float = parameter(
         0.0,
@@ -42,35 +43,34 @@ class WireInverseActuationParams:
 
 
 def wound_lengths(
-    posture: Sequence[float] | np.ndarray,
+    x: ArrayLike,
     params: WireInverseActuationParams,
     snake: SnakeParams,
     drive: SnakeDriveParams,
-) -> list[float]:
-    """Drum positions of a posture (7): wires 0 to 8 and the translation [m] (10).
+) -> np.ndarray:
+    """Drum positions of a posture x (7): wires 0 to 8 and the translation [m] (10).
 
     They hold the snake's weight as well: what gives way under it, wires or servos,
     is wound shorter by as much.
     """
-    x = universal(np.asarray(posture, float).tolist())
+    x = np.asarray(x, float)
     load = weight(x, snake, drive, params.gravity)
-    s = x[0] - float(load[0]) / drive.travel_kp
+    stiffness = np.array([drive.travel_kp] + [drive.kp] * (len(x) - 1))
+    lifted = x - load / stiffness
     if params.stiffness > 0.0:
-        L = wire_lengths(np.asarray(posture, float), snake)
         T = tensions(x[1:], -load[1:], snake, params.least_tension)
-        return [*(L - T / params.stiffness).tolist(), s]
-    ab = (np.array(x[1:]) - load[1:] / drive.kp).tolist()
-    return [*wire_lengths(from_universal([s, *ab]), snake).tolist(), s]
+        return np.append(wire_lengths(x, snake) - T / params.stiffness, lifted[0])
+    return np.append(wire_lengths(lifted, snake), lifted[0])
 
 
 class WireInverseActuation(Block):
     """Wire lengths for a posture, equations (2) and (3), distal wires included.
 
-    The posture is the one that the snake takes under its own weight.
+    The posture is the one that the snake takes under its own weight. One that is no
+    numbers leaves the drums where they are.
 
-    Port ``posture`` accepts s [m], alpha1, beta1, ..., alpha3, beta3 [rad] (7).
-
-    Port ``drums`` emits the lengths of wires 0 to 8 and the translation s [m] (10).
+    Port ``posture`` accepts the `Posture`.
+    Port ``drums`` emits the `Drums`.
     """
 
     def __init__(
@@ -78,15 +78,25 @@ class WireInverseActuation(Block):
         params: WireInverseActuationParams | None = None,
         snake: SnakeParams | None = None,
         drive: SnakeDriveParams | None = None,
+        posture: ArrayLike = REST,
     ) -> None:
-        """Makes the block for a snake and its drive."""
+        """Makes the block for a snake and its drive, starting at a posture (7)."""
         super().__init__()
         self._params = check(params or WireInverseActuationParams())
         self._snake = check(snake or SnakeParams())
         self._drive = check(drive or SnakeDriveParams())
-        self._posture = self.vector_in("posture", [0.0, 0.3, 0.2, 1.0, 0.4, 2.0, 0.1])
-        self.vector_out("drums", 10, self._calc_drums, {self._posture.ticket()})
+        self._posture = self.signal_in("posture", Posture)
+        self.DeclareDiscreteState(self._wound(posture))  # the last good drums
+        tickets = {self._posture.ticket(), self.xd_ticket()}
+        self._drums = self.cached("drums", self._calc_drums, tickets)
+        self.signal_out("drums", Drums, self._drums.Eval, {self._drums.ticket()})
+        self.update_every(self._params.period, self._drums.Eval)
 
-    def _calc_drums(self, context: Any) -> Sequence[float]:
-        posture = self._posture.Eval(context)
-        return wound_lengths(posture, self._params, self._snake, self._drive)
+    def _wound(self, x: ArrayLike) -> np.ndarray:
+        return wound_lengths(x, self._params, self._snake, self._drive)
+
+    def _calc_drums(self, context: Any) -> np.ndarray:
+        x = self._posture.Eval(context)
+        if np.isfinite(x).all():
+            return self._wound(x)
+        return np.array(context.get_discrete_state(0).value())

@@ -1,14 +1,26 @@
 """Wire tension: what the wires pull to give the modules' torques."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
-from plants.snake.parameters import SnakeParams
-from plants.snake.snake import NEAR_ANGLES, POSITIONS
+import numpy as np
+
+from plants.snake.parameters import MODULES, SnakeParams
+from plants.snake.signals import Numbers, SnakeState, Tensions
+from plants.snake.snake import NEAR_ANGLES
 from plants.snake.tension import tensions
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
+from systems.common.signal import Field, view
+
+
+class NetActuation(NamedTuple):
+    """What the plant's servos exert."""
+
+    travel: Annotated[float, Field("N", "force on the translation", 0.0)]
+    tau: Annotated[
+        Numbers, Field("N m", "torques on a1, b1, ..., b3", (0.0,) * (2 * MODULES))
+    ]
 
 
 @dataclass
@@ -27,13 +39,9 @@ class WireTension(Block):
     reaction forces and accelerations are not to be had in continuous time while
     couplers are there; the net actuation is.)
 
-    Port ``state`` accepts the plant's positions, then velocities, of the snake [m,
-    rad, m/s, rad/s] (26).
-
-    Port ``net_actuation`` accepts the force on the translation [N] and the torques
-    on a1, b1, ..., b3 [Nm] (7).
-
-    Port ``tension`` emits the tension of wires 0 to 8 [N] (9).
+    Port ``state`` accepts the plant's `SnakeState`.
+    Port ``net_actuation`` accepts the `NetActuation`.
+    Port ``tension`` emits the `Tensions`.
     """
 
     def __init__(
@@ -43,16 +51,12 @@ class WireTension(Block):
         super().__init__()
         self._params = check(params or WireTensionParams())
         self._snake = check(snake or SnakeParams())
-        self._state = self.vector_in("state", [0.0] * (2 * POSITIONS))
-        self._actuation = self.vector_in("net_actuation", [0.0] * 7)
-        self.vector_out(
-            "tension",
-            9,
-            self._calc_tension,
-            {self._state.ticket(), self._actuation.ticket()},
-        )
+        self._state = self.signal_in("state", SnakeState)
+        self._actuation = self.signal_in("net_actuation", NetActuation)
+        tickets = {self._state.ticket(), self._actuation.ticket()}
+        self.signal_out("tension", Tensions, self._calc_tension, tickets)
 
-    def _calc_tension(self, context: Any) -> Sequence[float]:
-        ab = self._state.Eval(context)[NEAR_ANGLES]
-        tau = self._actuation.Eval(context)[1:]
-        return tensions(ab, tau, self._snake, self._params.least).tolist()
+    def _calc_tension(self, context: Any) -> np.ndarray:
+        ab = view(SnakeState, self._state.Eval(context)).q[NEAR_ANGLES]
+        tau = view(NetActuation, self._actuation.Eval(context)).tau
+        return tensions(ab, tau, self._snake, self._params.least)

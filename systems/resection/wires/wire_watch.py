@@ -1,13 +1,23 @@
 """Wire watch: notices a slack or broken wire and stops the drums."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from systems.common.block import Block
+from plants.snake.parameters import MODULES, WIRES
+from plants.snake.signals import Stopped, Tensions
+from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
+from systems.common.signal import Field
+from systems.common.step_block import StepBlock
+
+
+class Alarm(NamedTuple):
+    """A wire that has been slack."""
+
+    time: Annotated[float, Field("s", "of the alarm, -1 before", -1.0)]
+    module: Annotated[float, Field("1", "1 to 3, -1 before", -1.0)]
 
 
 @dataclass
@@ -25,36 +35,48 @@ class WireWatchParams:
     )
 
 
-class WireWatch(Block):
+@compiled
+def watch(
+    params: Any,
+    count: np.ndarray,
+    alarm: Alarm,
+    stopped: Stopped,
+    time: float,
+    tensions: Tensions,
+) -> tuple[np.ndarray, Alarm, Stopped]:
+    """Slack samples in a row of each wire (9), the alarm, and whether to stop."""
+    T = np.array(tensions.T)
+    # A tension that is no number is not known to be enough.
+    count = np.where(params.least <= T, 0.0, count + 1.0)
+    if alarm.time < 0.0 and count.max() >= params.samples:
+        alarm = Alarm(time, count.argmax() // WIRES + 1.0)
+    return count, alarm, Stopped(1.0 if alarm.time >= 0.0 else 0.0)
+
+
+class WireWatch(StepBlock):
     """Raises an alarm, and keeps it, once a wire has been slack for some samples.
 
     A wire that snaps lets the other two of its module go slack within a
     millisecond or two, and wires beyond it may follow: what can be told is the
     module, the one nearest to the base that has a slack wire.
 
-    Port ``tension`` accepts the tension of wires 0 to 8, as load cells at the drums
-    measure them [N] (9).
-
-    Port ``stop`` emits 0, and 1 from the alarm on (1).
-
-    Port ``alarm`` emits the alarm's time [s] and the module, 1 to 3, or -1 and -1 (2).
+    Port ``tension`` accepts the `Tensions`, as load cells at the drums measure them.
+    Port ``stop`` emits whether the drums are `Stopped`, from the alarm on.
+    Port ``alarm`` emits the `Alarm`.
     """
 
     def __init__(self, params: WireWatchParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
-        self._params = check(params or WireWatchParams())
-        self._tension = self.vector_in("tension", [4.0] * 9)
-        self._count = self.DeclareDiscreteState([0.0] * 9)  # slack samples in a row
-        self._alarm = self.state_out("alarm", [-1.0, -1.0])
-        self.state_out("stop", [0.0])
-        self.update_every(self._params.period, self._update)
-
-    def _update(self, context: Any) -> Sequence[Sequence[float]]:
-        slack = self._tension.Eval(context) < self._params.least
-        before = context.get_discrete_state(self._count).value()
-        count = np.where(slack, before + 1.0, 0.0)
-        alarm = context.get_discrete_state(self._alarm).value().tolist()
-        if alarm[0] < 0.0 and count.max() >= self._params.samples:
-            alarm = [context.get_time(), float(count.argmax() // 3 + 1)]
-        return count.tolist(), alarm, [float(alarm[0] >= 0.0)]
+        params = check(params or WireWatchParams())
+        self.declare_update(
+            watch,
+            [packed(params)],
+            {"tension": Tensions},
+            {
+                "_count": np.zeros(WIRES * MODULES),
+                "alarm": Alarm(-1.0, -1.0),
+                "stop": Stopped(0.0),
+            },
+            params.period,
+        )

@@ -1,5 +1,6 @@
 """Resections end to end."""
 
+from dataclasses import replace
 import json
 import signal
 import subprocess
@@ -15,15 +16,18 @@ from diagrams.common.scenario import ScenarioError
 from diagrams.studies import build, load_scenario
 from plants.tissue.execution import Execution, load_execution, save_execution
 from systems.common.archive import beside
-from systems.resection.planning.reach import load_reach
-from systems.resection.planning.session import load_session
+from systems.resection.planning.reach import load_reach, save_reach
 from tests import runs
+
+SMALL = ["spacing=0.001", "reach_effort=0.25"]
+"""Of `resect_auto_small`: what a minute allows."""
+COARSE = [*SMALL, "planner.target=0.5", "planner.candidates=4"]
 
 
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
-    scenario = load_scenario("resect_paper", ["reach_effort=0.05"])
+    scenario = load_scenario("resect_paper", ["spacing=0.001", "reach_effort=0.05"])
     return run_scenario(scenario, out), out
 
 
@@ -46,9 +50,9 @@ def test_paper(paper):
 def test_carving_keeps_up(paper):
     """Each instant carves what was swept since the one before: a few stamps."""
     run, _ = paper
-    instants = run.signals["tissue.index"]
+    instants = run.tissue.index.number
     assert instants[-1] == round(run.simulated / run.scenario.period)
-    carved, way = np.diff(instants), np.diff(run.signals["tissue.way"])
+    carved, way = np.diff(instants), np.diff(run.tissue.way.length)
     assert carved.min() >= 4 and carved.max() <= 6  # in 0.1 s
     assert (way / carved).max() <= 4 * run.scenario.carver.pitch
 
@@ -96,7 +100,7 @@ def test_a_diagram_needs_no_plan(paper, monkeypatch):
 
 
 def test_refused():
-    run = runs.run("resect_refused")
+    run = runs.run("resect_refused", "spacing=0.001", "reach_effort=0.05")
     m = run.metrics
     assert [refusal["reason"] for refusal in m["refusals"]] == [
         "tool outside",
@@ -112,24 +116,31 @@ def test_refused():
     assert m["path_length"] < 1e-4
 
 
-def test_auto_resumes_after_being_killed(tmp_path):
-    """A plan cut off goes on from its file, and ends with all that it had."""
+@pytest.fixture
+def session_file(tmp_path):
+    """A session's file to be, with what can be reached of `SMALL` beside it."""
+    case = runs.run("resect_auto_small", *SMALL).case
     file = tmp_path / "s.session"
-    coarse = ["spacing=0.001", "reach_effort=0.25", "tumour.lobes=0"]
-    scenario = load_scenario(
-        "resect_auto_small",
-        [*coarse, f"session={file}", "planner.target=0.5", "planner.candidates=4"],
-    )
+    save_reach(beside(file, "reach"), case.reach, case.session, 1, 0.25)
+    return file
+
+
+def test_auto_resumes_after_being_killed(session_file):
+    """A plan cut off goes on from its file, and ends with all that it had."""
+    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={session_file}"])
     first = prepare(scenario).session
     steps = [step.name for step in first.steps]
-    scenario.planner.target = 0.9
+    scenario.planner.target = 0.8
     again = prepare(scenario).session
     assert [step.name for step in again.steps][: len(steps)] == steps
     assert again.fraction > first.fraction
 
 
-def test_auto_small():
-    run = runs.run("resect_auto_small")
+@pytest.mark.parametrize(
+    "overrides", [SMALL, pytest.param([], marks=pytest.mark.study)]
+)
+def test_auto_small(overrides):
+    run = runs.run("resect_auto_small", *overrides)
     m = run.metrics
     assert not run.error and run.simulated < 1200.0
     assert m["reachable_fraction"] >= 0.80
@@ -207,19 +218,12 @@ def test_console(tmp_path, monkeypatch, capsys):
     assert file.exists()
 
 
-COARSE = [
-    "spacing=0.001",
-    "reach_effort=0.25",
-    "tumour.lobes=0",
-    "planner.target=0.7",
-    "planner.candidates=4",
-]
-
-
-def test_execution_goes_on_after_being_killed(tmp_path):
+def test_execution_goes_on_after_being_killed(session_file, tmp_path):
     """What a killed run had removed stays removed, and the next one does the rest."""
-    file = tmp_path / "s.session"
-    whole = simulate(load_scenario("resect_auto_small", COARSE))
+    file = session_file
+    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
+    case = prepare(scenario)
+    whole = simulate(replace(case, scenario=replace(scenario, session="")))
     command = [sys.executable, "-m", "diagrams", "run", "resect_auto_small"]
     for override in [*COARSE, f"session={file}"]:
         command += ["--set", override]
@@ -229,8 +233,7 @@ def test_execution_goes_on_after_being_killed(tmp_path):
             time.sleep(0.02)
         child.kill()
     assert child.returncode == -signal.SIGKILL
-    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
-    done = load_execution(executed, prepare(scenario).session.postures)
+    done = load_execution(executed, case.session.postures)
     assert 0.0 < done.time < whole.metrics["execution_time"]
     rest = simulate(scenario)
     assert rest.metrics["resumed_at"] == done.time
@@ -244,7 +247,9 @@ def test_execution_goes_on_after_being_killed(tmp_path):
 
 def test_an_execution_of_another_plan_is_refused(tmp_path):
     file = tmp_path / "s.session"
-    scenario = load_scenario("resect_paper", [f"session={file}", "reach_effort=0.05"])
+    scenario = load_scenario(
+        "resect_paper", ["spacing=0.001", f"session={file}", "reach_effort=0.05"]
+    )
     postures = prepare(scenario).session.postures
     done = Execution(posture=5, tau=np.zeros((2, 2, 2), np.int32))
     save_execution(beside(file, "executed"), done, postures + 0.1)
@@ -255,12 +260,14 @@ def test_an_execution_of_another_plan_is_refused(tmp_path):
         simulate(scenario)
 
 
-def test_the_reachable_part_is_searched_once(tmp_path):
-    file = tmp_path / "s.session"
-    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
-    reach = prepare(scenario).reach
-    session = load_session(file)
+def test_the_reachable_part_is_searched_once(session_file, monkeypatch):
+    file = session_file
+    case = runs.run("resect_auto_small", *SMALL).case
+    reach, session = case.reach, case.session
     again = load_reach(beside(file, "reach"), session, 1, 0.25)
     assert again is not None and again.lumps == reach.lumps
     np.testing.assert_array_equal(again.mask, reach.mask)
     assert load_reach(beside(file, "reach"), session, 2, 0.25) is None
+    monkeypatch.delattr("diagrams.resection.operation.find_reach")
+    scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
+    np.testing.assert_array_equal(prepare(scenario).reach.mask, reach.mask)

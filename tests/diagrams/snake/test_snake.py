@@ -22,7 +22,7 @@ def test_circle():
     assert figures["min_tension"] == pytest.approx(1.0)
     assert figures["max_tension"] < 20.0
     assert figures["false_alarms"] == figures["refused_poses"] == 0
-    assert np.abs(run.matrix("wires.residual")).max() < 1e-9
+    assert np.abs(run.wires.residual.modules).max() < 1e-9
     assert set(plots(run)) == {"path", "errors", "wires"}
 
 
@@ -30,7 +30,7 @@ def test_reach():
     run = runs.run("snake_reach")
     assert run.metrics["max_pose_error"] <= 1e-3
     assert run.metrics["refused_poses"] == run.metrics["false_alarms"] == 0
-    assert (run.matrix("drums.limited") == 0.0).all()
+    assert (run.drums.limited.code == 0.0).all()
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +46,13 @@ def test_a_broken_wire_is_noticed_and_motion_stops(break_run):
     assert not break_run.error
     assert figures["false_alarms"] == 0
     assert 0.0 < figures["break_detection_time"] <= 0.05
-    alarm = break_run.matrix("watch.alarm")[-1]
-    assert alarm[1] == 2.0
-    after = break_run.signals["time"] > alarm[0] + 0.02
-    lengths = break_run.matrix("drums.lengths")[after]
+    alarm = break_run.watch.alarm
+    assert alarm.module[-1] == 2.0
+    after = break_run.signals["time"] > alarm.time[-1] + 0.02
+    lengths = np.column_stack(break_run.drums.lengths)[after]
     assert np.abs(np.diff(lengths, axis=0)).max() == 0.0
     assert figures["min_tension"] > 0.5
-    residual = np.abs(break_run.matrix("wires.residual")[:, 1])
+    residual = np.abs(break_run.wires.residual.modules[:, 1])
     before = break_run.signals["time"] < 1.0
     assert residual[before].max() < 1e-6  # all wires taut: they agree
     assert residual[after].max() > 1e-3
@@ -66,7 +66,7 @@ def test_elastic_wires_validate_the_drum_model(break_run):
     snake's weight.
     """
     drums = simulate(load_scenario("snake_circle", duration=1.0))
-    elastic, stiff = (r.matrix("snake.tool")[:50, :3] for r in (break_run, drums))
+    elastic, stiff = (r.snake.tool.p[:50] for r in (break_run, drums))
     apart = np.linalg.norm(elastic - stiff, axis=1).max()
     assert 1e-6 < apart < 0.1e-3
 
@@ -83,7 +83,7 @@ def test_any_wire_that_snaps_is_noticed(dead):
     breaks = [f"elastic.breaks=[{{wire: {dead}, time: 0.05}}]"]
     run = simulate(load_scenario("snake_wire_break", breaks, 1, 0.14))
     assert run.metrics["break_detection_time"] <= 0.05
-    assert run.matrix("watch.alarm")[-1, 1] == dead // 3 + 1
+    assert run.watch.alarm.module[-1] == dead // 3 + 1
 
 
 def test_same_seed_same_result():

@@ -10,6 +10,7 @@ from diagrams.snake.figures import module_figure, swept, workspace_figure
 from diagrams.snake.sliders import bend_with_sliders, show_snake
 from plants.snake.actuation import wire_lengths
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import bends_of, posture_of
 
 
 def test_elementary_volume_is_the_reference_pages():
@@ -34,11 +35,10 @@ def test_module_figure():
 
 def test_sliders_bend_the_snake():
     meshcat = start_meshcat()
-    q = bend_with_sliders(meshcat)
-    np.testing.assert_allclose(q[2::2], 0.3)
+    np.testing.assert_allclose(bends_of(bend_with_sliders(meshcat))[2::2], 0.3)
     assert not meshcat.GetSliderNames()
     shown = ["plate0", "plate6", "ball0", "ball5", "tool", "wires/wire8/ball5_middle"]
     assert all(meshcat.HasPath(f"snake/{name}") for name in shown)
-    q = np.array([0.01, 0.0, math.pi / 4, 0, 0, 0, 0])
-    lengths = show_snake(meshcat, q)
-    np.testing.assert_array_equal(lengths, wire_lengths(q, SnakeParams()))
+    x = posture_of([0.01, 0.0, math.pi / 4, 0, 0, 0, 0])
+    lengths = show_snake(meshcat, x)
+    np.testing.assert_array_equal(lengths, wire_lengths(x, SnakeParams()))

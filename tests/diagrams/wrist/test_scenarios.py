@@ -98,14 +98,14 @@ def test_same_seed_same_figures():
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("wrist=passive", "choose from pwe, spring, off, known"),
-        ("first_guess=[0.2, 0.0, 0.0]", "at most 0.05 m"),
-        ("abdomen.stiffness=-500.0", r"abdomen.stiffness=-500.0 must be in"),
-        ("fulcrum_estimator.stiffness=-1.0", "no abdominal"),
+        ("wrist=passive", "expected one of pwe, spring, off, known"),
+        ("first_guess=[0.2, 0.0, 0.0]", "first_guess=.* m: .*<= 0.05"),
+        ("abdomen.stiffness=-500.0", "abdomen.stiffness=-500.0 N/m: expected >= 10"),
+        ("fulcrum_estimator.stiffness=-1.0", "fulcrum_estimator.stiffness=-1.0 N/m"),
         ("tool_wrench.period=0.01", "share their instants"),
         ("tool_wrench.frame=7", "expected a text"),
-        ("compare=[pew]", "compare='pew'"),
-        ("wall_motion.wave=square", "'sine' or 'ventilator'"),
+        ("compare=[pew]", "compare=.'pew'.: expected one of pwe"),
+        ("wall_motion.wave=square", "wave='square': expected one of sine, ventilator"),
     ],
 )
 def test_bad_input(override, message):

@@ -37,7 +37,7 @@ def segment_distance(a, b):
 def test_clearance_is_the_distance_of_the_shafts_surfaces(make_scene, seed):
     rng = np.random.default_rng(seed)
     shafts = {}
-    for name in "SOC":
+    for name in ("target", "obstacle", "camera"):
         fulcrum = np.array([*rng.uniform(0.03, 0.1, 2) * rng.choice([-1, 1], 2), 0.0])
         tip = np.array([*rng.uniform(-0.05, 0.05, 2), -rng.uniform(0.05, 0.15)])
         u = (tip - fulcrum) / np.linalg.norm(tip - fulcrum)
@@ -48,8 +48,8 @@ def test_clearance_is_the_distance_of_the_shafts_surfaces(make_scene, seed):
 
     r = 0.5 * ROBOT.diameter
     robot = core(p_WP, p_WP, ROBOT.length - ROBOT.mount_length, r)
-    for value, name in zip(measured, "OSC", strict=True):
-        scope = name == "C"
+    for value, name in zip(measured, ("obstacle", "target", "camera"), strict=True):
+        scope = name == "camera"
         radius = 0.5 * (TOOLS.endoscope_diameter if scope else TOOLS.tool_diameter)
         length = TOOLS.endoscope_length if scope else TOOLS.tool_length
         other = core(shafts[name][:3], shafts[name][3:], length, radius)
@@ -59,7 +59,9 @@ def test_clearance_is_the_distance_of_the_shafts_surfaces(make_scene, seed):
 
 def test_columns_are_roles_or_names_where_a_role_is_shared():
     assert columns(
-        Clearance(object(), {"O": 1, "S": 2, "C": 3}).signals["clearance"]
+        Clearance(object(), {"obstacle": 1, "target": 2, "camera": 3}).signals[
+            "clearance"
+        ]
     ) == (
         "obstacle",
         "target",
@@ -71,7 +73,7 @@ def test_columns_are_roles_or_names_where_a_role_is_shared():
 
 
 def test_missing_geometry_is_refused():
-    with pytest.raises(ValueError, match=r"no geometry of \['C'\]"):
-        Clearance(object(), {"O": 1, "S": 2})
+    with pytest.raises(ValueError, match=r"no geometry of \['camera'\]"):
+        Clearance(object(), {"obstacle": 1, "target": 2})
     with pytest.raises(ValueError, match="no geometry of the robot"):
-        Clearance(None, {"O": 1, "S": 2, "C": 3})
+        Clearance(None, {"obstacle": 1, "target": 2, "camera": 3})

@@ -29,9 +29,9 @@ def posed(shafts, params=None, tools=TOOLS):
 def test_frames_stand_at_the_tips_along_the_shafts():
     slanted = np.array([0.6, 0.0, -0.8])
     shafts = {
-        "S": [0.01, 0.02, -0.10, *slanted],
-        "O": [0.05, 0.00, -0.05, 0.0, 0.0, -1.0],
-        "C": [0.00, 0.05, -0.03, 0.0, -0.6, -0.8],
+        "target": [0.01, 0.02, -0.10, *slanted],
+        "obstacle": [0.05, 0.00, -0.05, 0.0, 0.0, -1.0],
+        "camera": [0.00, 0.05, -0.03, 0.0, -0.6, -0.8],
     }
     _, poses = posed(shafts)
     for name, shaft in shafts.items():
@@ -41,12 +41,12 @@ def test_frames_stand_at_the_tips_along_the_shafts():
 
 
 def test_trocars_ride_on_the_shafts_at_the_fulcrums():
-    dut, _ = posed({name: [0, 0, 0, 0, 0, -1] for name in "SOC"})
+    dut, _ = posed({name: [0, 0, 0, 0, 0, -1] for name, _ in TOOLS})
     for fulcrum in (np.array(p) for p in dut.params.fulcrums):
         u = np.array([0.36, 0.48, -0.8])
         shaft = [*(fulcrum + 0.1 * u), *u]
-        _, poses = posed({"S": shaft, "O": shaft, "C": shaft})
-        near = [poses[f"trocar_{n}"].translation() for n in "SOC"]
+        _, poses = posed({name: shaft for name, _ in TOOLS})
+        near = [poses[f"trocar_{n}"].translation() for n, _ in TOOLS]
         distances = np.linalg.norm(np.array(near) - fulcrum, axis=1)
         assert distances.min() == pytest.approx(0.0, abs=1e-9)
 
@@ -61,17 +61,18 @@ def test_any_number_of_tools_is_posed():
 
 
 def test_poses_depend_on_nothing_but_the_shafts():
-    dut, _ = posed({name: [0, 0, 0, 0, 0, -1] for name in "SOC"})
+    dut, _ = posed({name: [0, 0, 0, 0, 0, -1] for name, _ in TOOLS})
     assert dut.num_continuous_states() == 0
     assert dut.GetOutputPort("poses").get_index() == 0
-    for port in ("S", "O", "C"):
+    for port, _ in TOOLS:
         assert f"``{port}``" in PosedTools.__doc__
 
 
 def test_overlap_with_the_robots_shaft_is_not_a_contact_and_is_measured(make_scene):
     # O's tip stands in the middle of the robot's shaft.
     scene = make_scene(
-        p_WP=(0.0, 0.0, -0.12), tool_shafts={"O": [0.0, 0.0, -0.06, -0.6, 0.0, -0.8]}
+        p_WP=(0.0, 0.0, -0.12),
+        tool_shafts={"obstacle": [0.0, 0.0, -0.06, -0.6, 0.0, -0.8]},
     )
     scene.simulator.AdvanceTo(0.2)  # CENIC would end the process here
     results = scene.plant.get_contact_results_output_port().Eval(scene.context)
@@ -89,7 +90,7 @@ def test_only_shafts_have_proximity_geometry(make_scene):
         inspector.GetName(g).split("::")[-1]
         for g in inspector.GetAllGeometryIds(Role.kProximity)
     ]
-    assert sorted(names) == ["shaft", "shaft_C", "shaft_O", "shaft_S"]
+    assert sorted(names) == ["shaft", "shaft_camera", "shaft_obstacle", "shaft_target"]
 
 
 @pytest.mark.parametrize(
@@ -97,7 +98,10 @@ def test_only_shafts_have_proximity_geometry(make_scene):
     [
         (PosedToolsParams(tool_length=2.0), "posed_tools.tool_length=2.0 m: .*<= 0.6"),
         (PosedToolsParams(view_half_angle=math.nan), "view_half_angle=nan"),
-        (PosedToolsParams(fulcrums=[[0.0, 0.0, 0.0]]), "fulcrums=.*one .*of S, O, C"),
+        (
+            PosedToolsParams(fulcrums=[[0.0, 0.0, 0.0]]),
+            "fulcrums=.*one .*of target, obstacle",
+        ),
         (
             PosedToolsParams(fulcrums=[[0.0, 0.0, math.inf]] * 3),
             "posed_tools.fulcrums=.* x 3 numbers",

@@ -7,14 +7,15 @@ from numpy.polynomial import Polynomial
 import pytest
 
 from plants.snake.actuation import (
-    bends_of_lengths,
-    checked_bends,
+    angles_of_lengths,
+    checked_angles,
     length_range,
     norm_of_length,
     wire_lengths,
 )
 from plants.snake.kinematics import module_transform
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import posture_of
 from plants.snake.two_wires import all_solutions, solve
 from systems.common.parameter import check
 
@@ -24,11 +25,16 @@ D = PARAMS.face
 
 
 def random_bends(count, seed=0):
+    """(0, alpha1, beta1, ..., beta3), (count, 7)."""
     rng = np.random.default_rng(seed)
     q = np.zeros((count, 7))
     q[:, 1::2] = rng.uniform(-math.pi, math.pi, (count, 3))
     q[:, 2::2] = rng.uniform(0.0, PARAMS.max_bend, (count, 3))
     return q
+
+
+def lengths_of(q, params=PARAMS):
+    return wire_lengths(posture_of(q), params)
 
 
 def taut_string(p, q, radius):
@@ -47,7 +53,7 @@ def taut_string(p, q, radius):
 def test_lengths_are_those_of_a_taut_string():
     q = random_bends(20_000)
     q[:, 3:] = 0.0  # module 1 bends, wire 0 at azimuth 0
-    lengths = wire_lengths(q, PARAMS)[:, 0]
+    lengths = lengths_of(q)[:, 0]
     lower = np.tile([R, 0.0, -D], (len(q), 1))  # P_i from the ball's centre
     # A ball turns by Rz(alpha) Ry(beta) Rz(-alpha), half of equation (1)'s bend.
     J = module_transform(q[:, 1], q[:, 2] / 2, H)[:, :3, :3]
@@ -59,11 +65,11 @@ def test_lengths_are_those_of_a_taut_string():
 
 def test_distal_wires_add_up():
     q = random_bends(50)
-    L = wire_lengths(q, PARAMS)
+    L = lengths_of(q)
     for m in range(3):
         only = np.zeros_like(q)
         only[:, 1 + 2 * m : 3 + 2 * m] = q[:, 1 + 2 * m : 3 + 2 * m]
-        alone = wire_lengths(only, PARAMS) - wire_lengths(np.zeros(7), PARAMS)
+        alone = lengths_of(only) - wire_lengths(np.zeros(7), PARAMS)
         assert np.abs(alone[:, : 3 * m]).max(initial=0.0) < 1e-15
         L = L - alone
     np.testing.assert_allclose(L, np.tile(wire_lengths(np.zeros(7), PARAMS), (50, 1)))
@@ -75,32 +81,27 @@ def test_stroke_of_a_module():
     low, high = length_range(PARAMS)
     assert low[0] - 4 * H == pytest.approx(-5.414e-3, abs=1e-6)
     assert high[0] - 4 * H == pytest.approx(4.712e-3, abs=1e-6)
-    L = wire_lengths(random_bends(20_000), PARAMS)
+    L = lengths_of(random_bends(20_000))
     assert (low <= L.min(0)).all() and (L.max(0) <= high).all()
 
 
 def test_forward_after_inverse_on_100000_postures():
     q = random_bends(100_000, seed=3)
-    bends = bends_of_lengths(wire_lengths(q, PARAMS), PARAMS)
-    assert np.abs(bends.residual).max() < 1e-12
-    for m in range(3):
-        alpha, beta = q[:, 1 + 2 * m], q[:, 2 + 2 * m]
-        alpha_f, beta_f = bends.q[:, 2 * m], bends.q[:, 2 * m + 1]
-        assert np.abs(beta_f - beta).max() < 1e-10
-        turn = np.angle(np.exp(1j * (alpha_f - alpha)))
-        assert np.abs(turn * np.sin(beta / 2)).max() < 1e-10
+    found = angles_of_lengths(lengths_of(q), PARAMS)
+    assert np.abs(found.residual).max() < 1e-12
+    assert np.abs(found.ab - posture_of(q)[:, 1:]).max() < 1e-10
 
 
 def test_straight_lengths_give_no_bend():
-    bends = bends_of_lengths(wire_lengths(np.zeros(7), PARAMS), PARAMS)
-    assert np.abs(bends.q[1::2]).max() < 1e-15
+    found = angles_of_lengths(wire_lengths(np.zeros(7), PARAMS), PARAMS)
+    assert np.abs(found.ab).max() < 1e-15
 
 
 def test_two_wires_have_two_solutions_of_which_one_counts():
     phi = PARAMS.azimuths()[0]
     for q in random_bends(2000, seed=5):
         q[3:] = 0.0
-        L = wire_lengths(q, PARAMS)
+        L = lengths_of(q)
         for i, j in ((0, 1), (1, 2), (2, 0)):
             pair, at = (L[i], L[j]), (phi[i], phi[j])
             found = all_solutions(pair, at, PARAMS)
@@ -121,7 +122,7 @@ def test_where_the_inequality_fails_two_postures_share_two_lengths():
     for _ in range(1000):
         q = np.zeros(7)
         q[1:3] = rng.uniform(-math.pi, math.pi), rng.uniform(0, math.pi / 4)
-        L = wire_lengths(q, loose)
+        L = lengths_of(q, loose)
         phi = loose.azimuths()[0]
         found = all_solutions((L[0], L[1]), (phi[0], phi[1]), loose)
         both += bool(len(found) == 2 and found[1, 1] <= math.pi / 4)
@@ -166,7 +167,7 @@ def test_dialytic_elimination_agrees():
     for _ in range(200):
         q = np.zeros(7)
         q[1:3] = rng.uniform(-3.0, 3.0), rng.uniform(0.1, PARAMS.max_bend)
-        L = wire_lengths(q, PARAMS)[:2]
+        L = lengths_of(q)[:2]
         p = [norm_of_length(x, R, E, H) for x in L]
         right = [
             (alpha, beta)
@@ -195,12 +196,12 @@ def test_dialytic_elimination_agrees():
 
 def test_residual_tells_a_slack_wire():
     q = random_bends(1, seed=2)[0]
-    L = wire_lengths(q, PARAMS)
-    assert np.abs(bends_of_lengths(L, PARAMS).residual).max() < 1e-12
+    L = lengths_of(q)
+    assert np.abs(angles_of_lengths(L, PARAMS).residual).max() < 1e-12
     for w in range(9):
         slack = L.copy()
         slack[w] += 0.2e-3
-        residual = bends_of_lengths(slack, PARAMS).residual
+        residual = angles_of_lengths(slack, PARAMS).residual
         assert abs(residual[w // 3]) > 5e-3
 
 
@@ -213,18 +214,18 @@ def test_residual_tells_a_slack_wire():
     ],
 )
 def test_lengths_no_posture_has_are_refused(wire, change, message):
-    L = wire_lengths(random_bends(1, seed=4)[0] * 0.5, PARAMS)
-    assert np.isfinite(checked_bends(L, PARAMS)).all()
+    L = lengths_of(random_bends(1, seed=4)[0] * 0.5)
+    assert np.isfinite(checked_angles(L, PARAMS)).all()
     L[wire] += change
     with pytest.raises(ValueError, match=message):
-        checked_bends(L, PARAMS)
+        checked_angles(L, PARAMS)
 
 
 def test_a_bend_beyond_its_limit_is_refused():
     q = np.zeros(7)
     q[2] = 0.83
     with pytest.raises(ValueError, match=r"wire \d of module 1|beyond max_bend"):
-        checked_bends(wire_lengths(q, PARAMS), PARAMS)
+        checked_angles(lengths_of(q), PARAMS)
     q[1:3] = 0.2, 0.79  # no wire at this azimuth is at the end of its own range
     with pytest.raises(ValueError, match=r"beyond max_bend=0\.7854"):
-        checked_bends(wire_lengths(q, PARAMS), PARAMS)
+        checked_angles(lengths_of(q), PARAMS)

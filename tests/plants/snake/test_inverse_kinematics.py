@@ -5,25 +5,25 @@ import math
 import numpy as np
 import pytest
 
-from plants.snake.inverse_kinematics import (
+from plants.snake.inverse_kernels import (
     BEND,
     LAST_BEND,
     REACHED,
     TRAVEL_HIGH,
     TRAVEL_LOW,
-    positioning,
-    tool_posture,
-    tool_postures,
 )
+from plants.snake.inverse_kinematics import positioning, tool_posture, tool_postures
 from plants.snake.kinematics import forward
 from plants.snake.last_module import bend_for_radius, entry, last_module, meridian
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import bends_of, posture_of
 from systems.common.parameter import check
 
 PARAMS = SnakeParams()
 
 
-def random_postures(count, seed=0, params=PARAMS):
+def random_bends(count, seed=0, params=PARAMS):
+    """(s, alpha1, beta1, ..., beta3), (count, 7)."""
     rng = np.random.default_rng(seed)
     q = np.empty((count, 7))
     q[:, 0] = rng.uniform(*params.travel, count)
@@ -32,10 +32,10 @@ def random_postures(count, seed=0, params=PARAMS):
     return q
 
 
-def intermediate(q5, params=PARAMS):
+def intermediate(x5, params=PARAMS):
     """p_WI and n_WI: the tool's pose with module 3 straight, moved back to O2."""
-    q = np.concatenate([q5, np.zeros((*np.shape(q5)[:-1], 2))], axis=-1)
-    X = forward(q, params)
+    x = np.concatenate([x5, np.zeros((*np.shape(x5)[:-1], 2))], axis=-1)
+    X = forward(x, params)
     n = X[..., :3, 2]
     return X[..., :3, 3] - (params.straight_module + params.tool_offset) * n, n
 
@@ -43,15 +43,16 @@ def intermediate(q5, params=PARAMS):
 @pytest.mark.parametrize("max_bend", [math.pi / 4, 0.6, 0.25])
 def test_every_reachable_pose_has_its_posture(max_bend):
     params = check(SnakeParams(max_bend=max_bend))
-    q = random_postures(20_000, params=params)
-    p, n = intermediate(q[:, :5], params)
+    q = random_bends(20_000, params=params)[:, :5]
+    p, n = intermediate(posture_of(q), params)
     answer = positioning(p, n, params)
     assert answer.reached.all()
-    p_back, n_back = intermediate(answer.q, params)
+    p_back, n_back = intermediate(answer.x, params)
     assert np.linalg.norm(p_back - p, axis=1).max() <= 1e-9
     assert np.abs(n_back - n).max() <= 1e-12
-    assert np.abs(answer.q[:, [0, 2, 4]] - q[:, [0, 2, 4]]).max() < 1e-9
-    assert (answer.q[:, 2::2] <= max_bend).all() and (answer.q[:, 2::2] >= 0).all()
+    found = bends_of(answer.x)
+    assert np.abs(found[:, [0, 2, 4]] - q[:, [0, 2, 4]]).max() < 1e-9
+    assert (found[:, 2::2] <= max_bend + 1e-12).all()
 
 
 @pytest.mark.parametrize(
@@ -69,10 +70,10 @@ def test_every_reachable_pose_has_its_posture(max_bend):
     ],
 )
 def test_special_poses(q5):
-    p, n = intermediate(np.array(q5))
+    p, n = intermediate(posture_of(q5))
     answer = positioning(p, n, PARAMS)
     assert answer.status == REACHED
-    p_back, n_back = intermediate(answer.q)
+    p_back, n_back = intermediate(answer.x)
     np.testing.assert_allclose(p_back, p, atol=1e-12)
     np.testing.assert_allclose(n_back, n, atol=1e-10)
 
@@ -82,15 +83,15 @@ def test_the_posture_is_unique():
     from scipy.optimize import least_squares
 
     rng = np.random.default_rng(4)
-    for q in random_postures(8, seed=9)[:, :5]:
-        p, n = intermediate(q)
+    for q in random_bends(8, seed=9)[:, :5]:
+        p, n = intermediate(posture_of(q))
 
         def error(x, p=p, n=n):
-            p_x, n_x = intermediate(x)
+            p_x, n_x = intermediate(posture_of(x))
             return np.concatenate([(p_x - p) * 100, n_x - n])
 
         for _ in range(6):
-            start = np.array([*random_postures(1, rng.integers(1 << 30))[0, :5]])
+            start = np.array([*random_bends(1, rng.integers(1 << 30))[0, :5]])
             found = least_squares(error, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
             if found.cost < 1e-24 and (np.abs(found.x[2::2]) <= PARAMS.max_bend).all():
                 bends = np.abs(found.x[[0, 2, 4]])
@@ -98,7 +99,7 @@ def test_the_posture_is_unique():
 
 
 def test_travel_is_named():
-    p, n = intermediate(np.array([0.0, 0.3, 0.2, 1.0, 0.4]))
+    p, n = intermediate(posture_of([0.0, 0.3, 0.2, 1.0, 0.4]))
     low, high = PARAMS.travel
     far = positioning(np.add(p, [[0, 0, low - 1e-4], [0, 0, high + 1e-4]]), n, PARAMS)
     assert far.status.tolist() == [TRAVEL_LOW, TRAVEL_HIGH]
@@ -106,20 +107,20 @@ def test_travel_is_named():
 
 
 def test_tool_poses():
-    q = random_postures(20_000, seed=2)
-    X = forward(q, PARAMS)
-    n_WI = intermediate(q[:, :5])[1]
+    x = posture_of(random_bends(20_000, seed=2))
+    X = forward(x, PARAMS)
+    n_WI = intermediate(x[:, :5])[1]
     answer = tool_postures(X[:, :3, 3], X[:, :3, 2], n_WI, PARAMS)
     assert answer.reached.all()
-    back = forward(answer.q, PARAMS)
+    back = forward(answer.x, PARAMS)
     assert np.abs(back[:, :3, 3] - X[:, :3, 3]).max() <= 1e-9
     assert np.abs(back[:, :3, 2] - X[:, :3, 2]).max() <= 1e-12
-    assert np.abs(answer.q[:, 6] - q[:, 6]).max() < 1e-9
+    assert np.abs(bends_of(answer.x)[:, 6] - bends_of(x)[:, 6]).max() < 1e-9
     for i in range(20):
         target = np.concatenate([X[i, :3, 3], 2 * X[i, :3, 2], 3 * n_WI[i]])
-        q_one, status = tool_posture(target, PARAMS)
+        one, status = tool_posture(target, PARAMS)
         assert status == REACHED
-        np.testing.assert_allclose(q_one, answer.q[i], atol=1e-9)
+        np.testing.assert_allclose(one, answer.x[i], atol=1e-9)
     across = tool_postures([0, 0, 0.05], [0, 0, 1], [1, 0, -0.1], PARAMS)
     assert across.status == LAST_BEND
 
@@ -129,10 +130,10 @@ def test_last_module_and_entry_in_closed_form():
         beta = bend_for_radius(radius, PARAMS)
         assert 0.0 <= beta <= PARAMS.max_bend
         assert float(meridian(beta, PARAMS)[0]) == pytest.approx(radius, abs=1e-15)
-    q = entry([0.006, -0.008, 0.030], PARAMS)
-    assert (q[1:5] == 0.0).all()
+    x = entry([0.006, -0.008, 0.030], PARAMS)
+    assert (x[1:5] == 0.0).all()
     np.testing.assert_allclose(
-        forward(q, PARAMS)[:3, 3], [0.006, -0.008, 0.030], atol=1e-15
+        forward(x, PARAMS)[:3, 3], [0.006, -0.008, 0.030], atol=1e-15
     )
     alpha, _, gap = last_module([0.0, 0.01, 0.02], PARAMS)
     assert alpha == pytest.approx(math.pi / 2)

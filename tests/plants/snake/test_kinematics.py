@@ -5,24 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from plants.snake.jacobian import jacobian, universal_jacobian
-from plants.snake.kinematics import (
-    centreline,
-    forward,
-    frames,
-    from_universal,
-    limit_excess,
-    module_transform,
-    to_universal,
-)
+from plants.snake.jacobian import jacobian
+from plants.snake.kinematics import centreline, forward, frames, module_transform
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import bends_of, posture_of
 from systems.common.parameter import check
 
 PARAMS = SnakeParams()
 H = PARAMS.half_pitch
 
 
-def random_postures(count, seed=0):
+def random_bends(count, seed=0):
+    """(s, alpha1, beta1, ..., beta3), (count, 7)."""
     rng = np.random.default_rng(seed)
     q = np.empty((count, 7))
     q[:, 0] = rng.uniform(*PARAMS.travel, count)
@@ -75,8 +69,8 @@ def up(distance):
     return X
 
 
-@pytest.mark.parametrize("q", random_postures(200))
-def test_module_is_equation_1_and_figure_4_and_its_universal_form(q):
+@pytest.mark.parametrize("q", random_bends(200))
+def test_module_is_equation_1_and_figure_4_and_smooth_in_a_and_b(q):
     alpha, beta = q[1:3]
     X = module_transform(alpha, beta, H)
     printed = equation_1(alpha, beta, H)
@@ -91,11 +85,12 @@ def test_module_is_equation_1_and_figure_4_and_its_universal_form(q):
         @ turn("z", -alpha)
     )
     np.testing.assert_allclose(X, four_joints, atol=1e-12)
-    a, b = to_universal(alpha, beta)
+    x = posture_of(q)
+    a, b = x[1:3]
     ball = turn("x", a) @ turn("y", b)
     mirrored = turn("y", b) @ turn("x", a)
     np.testing.assert_allclose(X, ball @ up(2 * H) @ mirrored @ up(2 * H), atol=1e-12)
-    np.testing.assert_allclose(from_universal(a, b), (alpha, beta), atol=1e-12)
+    np.testing.assert_allclose(bends_of(x), q, atol=1e-12)
 
 
 def test_module_bends_90_degrees():
@@ -104,13 +99,13 @@ def test_module_bends_90_degrees():
 
 
 def test_robot_is_the_chain_of_modules_and_tool():
-    q = random_postures(500)
-    X = forward(q, PARAMS)
-    points = centreline(q, PARAMS)
+    x = posture_of(random_bends(500))
+    X = forward(x, PARAMS)
+    points = centreline(x, PARAMS)
     assert X.shape == (500, 4, 4) and points.shape == (500, 8, 3)
     for i in range(500):
-        chain = frames(q[i], PARAMS)
-        np.testing.assert_allclose(X[i], chain[3] @ up(PARAMS.tool_offset), atol=1e-15)
+        chain = frames(x[i], PARAMS)
+        np.testing.assert_allclose(X[i], chain[3] @ up(PARAMS.tool_offset), atol=2e-15)
         np.testing.assert_allclose(points[i, [0, 2, 4, 6]], [c[:3, 3] for c in chain])
     np.testing.assert_allclose(points[:, 7], X[:, :3, 3], atol=1e-17)
     lengths = np.linalg.norm(np.diff(points, axis=1), axis=2)
@@ -118,10 +113,10 @@ def test_robot_is_the_chain_of_modules_and_tool():
 
 
 def test_one_posture_and_many_agree():
-    q = random_postures(6).reshape(2, 3, 7)
-    X = forward(q, PARAMS)
+    x = posture_of(random_bends(6).reshape(2, 3, 7))
+    X = forward(x, PARAMS)
     assert X.shape == (2, 3, 4, 4)
-    np.testing.assert_array_equal(X[1, 2], forward(q[1, 2], PARAMS))
+    np.testing.assert_array_equal(X[1, 2], forward(x[1, 2], PARAMS))
 
 
 def test_straight_robot():
@@ -141,41 +136,24 @@ def spatial_differences(f, x):
     return J
 
 
-@pytest.mark.parametrize("q", random_postures(20, seed=1))
-def test_jacobians_match_differences(q):
-    expected = spatial_differences(lambda x: forward(x, PARAMS), q)
-    np.testing.assert_allclose(jacobian(q, PARAMS), expected, atol=1e-8)
-
-    def with_universal(x):
-        alpha, beta = from_universal(x[1::2], x[2::2])
-        return forward(
-            np.concatenate([x[:1], np.stack([alpha, beta], 1).ravel()]), PARAMS
-        )
-
-    x = q.copy()
-    x[1::2], x[2::2] = to_universal(q[1::2], q[2::2])
-    expected = spatial_differences(with_universal, x)
-    np.testing.assert_allclose(universal_jacobian(q, PARAMS), expected, atol=1e-8)
+@pytest.mark.parametrize("q", random_bends(20, seed=1))
+def test_jacobian_matches_differences(q):
+    x = posture_of(q)
+    expected = spatial_differences(lambda y: forward(y, PARAMS), x)
+    np.testing.assert_allclose(jacobian(x, PARAMS), expected, atol=1e-8)
 
 
-def test_universal_jacobian_is_regular_where_the_papers_is_not():
-    q = np.zeros(7)
-    assert np.linalg.matrix_rank(jacobian(q, PARAMS)[:, 1:], tol=1e-9) < 4
-    assert np.linalg.matrix_rank(universal_jacobian(q, PARAMS)[:, 1:], tol=1e-9) == 4
+def test_jacobian_is_regular_where_the_papers_parameters_are_not():
+    def straight(q):
+        return forward(posture_of(q), PARAMS)
 
-
-def test_bend_limit_is_a_cone_not_a_box():
-    a = b = math.radians(45.0)  # a corner of the box of (a, b)
-    alpha, beta = from_universal(a, b)
-    q = np.array([0.2, alpha, beta, 0.0, 0.0, 1.0, -0.1])
-    excess = limit_excess(q, PARAMS)
-    assert excess[0] == pytest.approx(0.2 - PARAMS.travel[1])
-    assert excess[1] == pytest.approx(math.radians(15.0))  # the corner reaches 60 deg
-    assert excess[2] == excess[3] == 0.0
+    papers = spatial_differences(straight, np.zeros(7))
+    assert np.linalg.matrix_rank(papers[:, 1:], tol=1e-6) < 4
+    assert np.linalg.matrix_rank(jacobian(np.zeros(7), PARAMS)[:, 1:], tol=1e-9) == 4
 
 
 def test_a_wrong_shape_is_refused():
-    with pytest.raises(ValueError, match="a posture has 7 numbers"):
+    with pytest.raises(ValueError, match=r"shape \(6,\), expected \(..., 7\)"):
         forward(np.zeros(6), PARAMS)
 
 

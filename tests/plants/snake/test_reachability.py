@@ -8,6 +8,7 @@ import pytest
 from plants.snake.inverse_kinematics import positioning
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import bends_of, posture_of
 from plants.snake.reachability import refusal
 from systems.common.parameter import check
 
@@ -37,13 +38,13 @@ def check_refusal(p, n, rng):
     answer = refusal(p, n, PARAMS)
     assert answer is not None and answer.limits
     # The nearest pose is one, and as far away as said.
-    back = forward(np.append(answer.q, [0.0, 0.0]), PARAMS)
+    back = forward(np.append(answer.x, [0.0, 0.0]), PARAMS)
     p_back = back[:3, 3] - (PARAMS.straight_module + PARAMS.tool_offset) * back[:3, 2]
     np.testing.assert_allclose(p_back, answer.p_WI, atol=1e-9)
     np.testing.assert_allclose(back[:3, 2], n, atol=1e-9)
     assert np.linalg.norm(p - answer.p_WI) == pytest.approx(answer.gap, abs=1e-9)
     # The limits named are the ones its posture stands on.
-    s, _, beta1, _, beta2 = answer.q
+    s, _, beta1, _, beta2 = bends_of(answer.x)
     on = {
         "beta1": beta1 > PARAMS.max_bend - 1e-5,
         "beta2": beta2 > PARAMS.max_bend - 1e-5,
@@ -93,7 +94,7 @@ def test_5000_refused_poses():
     ],
 )
 def test_a_pose_past_one_limit_is_stopped_by_that_limit(limit, q5):
-    X = forward([*q5, 0.0, 0.0], PARAMS)
+    X = forward(posture_of([*q5, 0.0, 0.0]), PARAMS)
     p = X[:3, 3] - (PARAMS.straight_module + PARAMS.tool_offset) * X[:3, 2]
     answer = refusal(p, X[:3, 2], PARAMS)
     assert answer is not None
@@ -110,4 +111,4 @@ def test_an_axis_that_leans_too_far_is_turned():
     assert "tilt" in answer.limits
     assert answer.tilt_gap == pytest.approx(0.3)
     assert answer.n_WI[2] == pytest.approx(math.cos(2.0))
-    assert np.isfinite(answer.q).all()
+    assert np.isfinite(answer.x).all()

@@ -9,8 +9,9 @@ import pytest
 from plants.snake.actuation import wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.elastic import elastic_pull
-from plants.snake.kinematics import forward, frames, to_universal
+from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
 from plants.snake.tension import length_jacobian
 from plants.snake.wire_path import hanging_points, tangent_points, wires_at
@@ -25,17 +26,15 @@ def make_plant(time_step=0.0, elastic=False):
     return plant, snake
 
 
-def positions(q):
-    x = np.zeros(POSITIONS)
-    a, b = to_universal(q[1::2], q[2::2])
-    x[NEAR] = [q[0], *np.stack([a, b], 1).ravel()]
-    x[FAR] = x[NEAR[1:]]
-    return x
+def positions(x):
+    q = np.zeros(POSITIONS)
+    q[NEAR], q[FAR] = x, x[1:]
+    return q
 
 
 def random_posture(rng):
     bends = np.stack([rng.uniform(-3, 3, 3), rng.uniform(0, PARAMS.max_bend, 3)], 1)
-    return np.concatenate([rng.uniform(*PARAMS.travel, 1), bends.ravel()])
+    return posture_of([rng.uniform(*PARAMS.travel), *bends.ravel()])
 
 
 def test_seven_freedoms_and_the_pose_of_equation_1():
@@ -45,12 +44,12 @@ def test_seven_freedoms_and_the_pose_of_equation_1():
     assert plant.num_actuators() == 7
     context, rng = plant.CreateDefaultContext(), np.random.default_rng(0)
     for _ in range(100):
-        q = random_posture(rng)
-        plant.SetPositions(context, positions(q))
+        x = random_posture(rng)
+        plant.SetPositions(context, positions(x))
         X_WT = snake.tool.CalcPoseInWorld(context).GetAsMatrix4()
-        np.testing.assert_allclose(X_WT, forward(q, PARAMS), atol=1e-14)
+        np.testing.assert_allclose(X_WT, forward(x, PARAMS), atol=1e-14)
         # The end plates' frames are the paper's O1, O2, O3, less 2h along z.
-        for k, X_WO in enumerate(frames(q, PARAMS)[1:], start=1):
+        for k, X_WO in enumerate(frames(x, PARAMS)[1:], start=1):
             plate = plant.GetBodyByName(f"plate{2 * k}").body_frame()
             R = plate.CalcPoseInWorld(context).rotation().matrix()
             np.testing.assert_allclose(R, X_WO[:3, :3], atol=1e-14)
@@ -74,21 +73,20 @@ def test_springs_have_the_stiffness_of_the_wires():
 
 
 def test_a_gain_of_zero_is_refused():
-    with pytest.raises(ValueError, match=r"kp=0.0 must be > 0; the default is 1"):
+    with pytest.raises(ValueError, match=r"snake_drive.kp=0.0 .*the default is 1"):
         add_snake(MultibodyPlant(0.0), None, drive=SnakeDriveParams(kp=0.0))
 
 
 def test_elastic_pull_is_stretch_through_the_jacobian():
     rng, drive = np.random.default_rng(3), SnakeDriveParams()
     for _ in range(30):
-        q = random_posture(rng)
-        a, b = to_universal(q[1::2], q[2::2])
-        ab = np.stack([a, b], 1).ravel()
+        x = random_posture(rng)
+        ab = x[1:]
         J = length_jacobian(ab, PARAMS)
-        wound = wire_lengths(q, PARAMS) - rng.uniform(-2e-4, 4e-4, 9)
+        wound = wire_lengths(x, PARAMS) - rng.uniform(-2e-4, 4e-4, 9)
         ab_rate, wound_rate = rng.normal(size=6), rng.normal(scale=0.01, size=9)
         T, tau = elastic_pull(ab, ab_rate, wound, wound_rate, PARAMS, drive)
-        expected = drive.wire_stiffness * (wire_lengths(q, PARAMS) - wound)
+        expected = drive.wire_stiffness * (wire_lengths(x, PARAMS) - wound)
         expected += drive.wire_damping * (J @ ab_rate - wound_rate)
         np.testing.assert_allclose(T, np.maximum(expected, 0.0), atol=1e-9)
         np.testing.assert_allclose(tau, -J.T @ T, atol=1e-12)
@@ -106,9 +104,9 @@ def test_drawn_path_is_as_long_as_the_wires():
     rng = np.random.default_rng(5)
     R, e = PARAMS.ball_radius, PARAMS.plate_thickness
     for _ in range(50):
-        q = random_posture(rng)
+        x = random_posture(rng)
         length = np.zeros(9)
-        for ball, (centre, P, P_far) in enumerate(hanging_points(q, PARAMS)):
+        for ball, (centre, P, P_far) in enumerate(hanging_points(x, PARAMS)):
             B, C = tangent_points(centre, P, P_far, PARAMS)
             chord = np.linalg.norm(C - B, axis=1)
             direct = np.linalg.norm(P_far - P, axis=1)
@@ -121,5 +119,5 @@ def test_drawn_path_is_as_long_as_the_wires():
             on_ball = np.linalg.norm(B - centre, axis=1)[touching]
             np.testing.assert_allclose(on_ball, R, rtol=1e-12)
             length[list(wires_at(ball))] += np.where(touching, round_it, direct) + e
-        np.testing.assert_allclose(length, wire_lengths(q, PARAMS), atol=1e-12)
+        np.testing.assert_allclose(length, wire_lengths(x, PARAMS), atol=1e-12)
         assert math.isfinite(length.sum())

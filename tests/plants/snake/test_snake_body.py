@@ -1,24 +1,10 @@
-"""The body's kinematics against the plant's, and driving."""
+"""The body: its limits, and driving it."""
 
 import numpy as np
 
-from plants.snake.kinematics import centreline
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import OK, body_of, check_limits, corners, drive
-from systems.resection.wires.resection_ik import universal
+from plants.snake.snake_body import OK, body_of, check_limits, drive
 from tests.ball import ball_session
-
-
-def test_corners_are_the_centreline():
-    rng = np.random.default_rng(0)
-    params = SnakeParams()
-    c = np.empty((8, 3))
-    for _ in range(200):
-        q = rng.uniform(-3, 3, 7)
-        q[0] *= 0.02
-        q[2::2] = rng.uniform(0, np.pi / 4, 3)
-        corners(np.array(universal(q)), params.half_pitch, params.tool_offset, c)
-        np.testing.assert_allclose(c, centreline(q, params), atol=1e-15)
 
 
 def test_limits_are_a_cone():

@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 
 from plants.snake.actuation import wire_lengths
-from plants.snake.kinematics import forward, from_universal
+from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import bends_of
 from plants.snake.tension import length_jacobian, tensions, torques_against
 
 PARAMS = SnakeParams()
 
 
 def random_angles(rng):
-    """Universal angles within the cone beta <= max_bend."""
+    """a1, b1, ..., b3 within the cone beta <= max_bend."""
     while True:
-        ab = rng.uniform(-PARAMS.max_bend, PARAMS.max_bend, 6)
-        if (from_universal(ab[::2], ab[1::2])[1] <= PARAMS.max_bend).all():
-            return ab
+        x = np.append(0.0, rng.uniform(-PARAMS.max_bend, PARAMS.max_bend, 6))
+        if (bends_of(x)[2::2] <= PARAMS.max_bend).all():
+            return x[1:]
 
 
 def lengths(ab):
-    alpha, beta = from_universal(ab[::2], ab[1::2])
-    return wire_lengths([0.0, *np.stack([alpha, beta], 1).ravel()], PARAMS)
+    return wire_lengths([0.0, *ab], PARAMS)
 
 
 def test_length_jacobian_matches_differences():
@@ -73,14 +73,9 @@ def test_tensions_hold_a_load_at_the_tip():
     rng = np.random.default_rng(2)
     for _ in range(20):
         ab, force = random_angles(rng), rng.normal(size=3)
-        alpha, beta = from_universal(ab[::2], ab[1::2])
-        q = np.array([0.0, *np.stack([alpha, beta], 1).ravel()])
-        T = tensions(ab, torques_against(q, force, PARAMS), PARAMS)
+        T = tensions(ab, torques_against([0.0, *ab], force, PARAMS), PARAMS)
         d = 1e-6 * rng.normal(size=6)
-        ends = [from_universal((ab + s * d)[::2], (ab + s * d)[1::2]) for s in (-1, 1)]
-        tips = [
-            forward([0.0, *np.stack(end, 1).ravel()], PARAMS)[:3, 3] for end in ends
-        ]
+        tips = [forward([0.0, *(ab + s * d)], PARAMS)[:3, 3] for s in (-1, 1)]
         work = force @ (tips[1] - tips[0])
         wound = T @ (lengths(ab + d) - lengths(ab - d))
         assert work == pytest.approx(wound, abs=1e-9)

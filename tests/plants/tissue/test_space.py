@@ -36,10 +36,10 @@ def test_balls_agree_with_a_plain_computation(volume):
         p = rng.uniform([-0.008, -0.008, 0.004], [0.008, 0.008, 0.022])
         rho = rng.uniform(0.0005, 0.004)
         within = ((points - p) ** 2).sum(axis=1) <= rho**2
-        found = sp.first_solid(s, *p, rho)
+        found = sp.first_solid(s, p, rho)
         assert (found == sp.FREE) == (not (within & solid).any())
         assert found < 0 or (within & solid)[found]
-        found = sp.first_forbidden(s, *p, rho)
+        found = sp.first_forbidden(s, p, rho)
         assert (found == sp.FREE) == (not (within & forbidden).any())
 
 
@@ -47,11 +47,11 @@ def test_stamps_free_what_the_ball_covers_and_can_be_rolled_back(volume):
     s = volume.space()
     before = volume.tau.copy()
     p, rho = np.array([0.0005, -0.0003, 0.011]), 0.004
-    sp.stamp(s, *p, rho, 7)
+    sp.stamp(s, p, rho, 7)
     within = ((centres(volume) - p) ** 2).sum(axis=1) <= rho**2
     assert ((volume.tau.reshape(-1) == 7) == within).all()
     assert s.used[0] == within.sum()
-    sp.stamp(s, *p, rho + 0.001, 8)
+    sp.stamp(s, p, rho + 0.001, 8)
     assert (volume.tau == 7).sum() == within.sum()  # the first arrival counts
     sp.roll_back(s, 0, 0)
     np.testing.assert_array_equal(volume.tau, before)
@@ -60,19 +60,19 @@ def test_stamps_free_what_the_ball_covers_and_can_be_rolled_back(volume):
 def test_what_was_found_roomy_is_forgotten_with_the_thought(volume):
     s = volume.space()
     p = (0.0, 0.0, 0.012)
-    assert sp.body_solid(s, *p, 0.003) >= 0
-    sp.stamp(s, *p, 0.006, 1)
-    assert sp.body_solid(s, *p, 0.003) == sp.FREE
+    assert sp.body_solid(s, p, 0.003) >= 0
+    sp.stamp(s, p, 0.006, 1)
+    assert sp.body_solid(s, p, 0.003) == sp.FREE
     assert volume.roomy.any()
     sp.roll_back(s, 0, 0)
     assert not volume.roomy.any()
-    assert sp.body_solid(s, *p, 0.003) >= 0
+    assert sp.body_solid(s, p, 0.003) >= 0
 
 
 def test_plate_agrees_with_a_plain_computation(volume):
     rng = np.random.default_rng(2)
     s = volume.space()
-    sp.stamp(s, 0.0, 0.0, 0.012, 0.006, 1)
+    sp.stamp(s, (0.0, 0.0, 0.012), 0.006, 1)
     points = centres(volume)
     solid = volume.tau.reshape(-1) == sp.SOLID
     answers = set()
@@ -84,7 +84,7 @@ def test_plate_agrees_with_a_plain_computation(volume):
         along = (points - p) @ n
         across = np.linalg.norm(points - p - along[:, None] * n, axis=1)
         within = (along >= 0) & (along <= length) & (across <= rho)
-        found = sp.plate_solid(s, *p, *n, length, rho)
+        found = sp.plate_solid(s, p, n, length, rho)
         assert (found == sp.FREE) == (not (within & solid).any())
         answers.add(found == sp.FREE)
     assert answers == {True, False}
@@ -92,15 +92,15 @@ def test_plate_agrees_with_a_plain_computation(volume):
 
 def test_beyond_the_grid_is_solid_but_the_channel_goes_on(volume):
     s = volume.space()
-    assert sp.first_solid(s, 0.0, 0.0, -0.2, 0.004) == sp.FREE
-    assert sp.first_solid(s, 0.002, 0.0, -0.2, 0.004) == sp.OUTSIDE
-    assert sp.first_solid(s, 0.1, 0.0, 0.01, 0.004) == sp.OUTSIDE
+    assert sp.first_solid(s, (0.0, 0.0, -0.2), 0.004) == sp.FREE
+    assert sp.first_solid(s, (0.002, 0.0, -0.2), 0.004) == sp.OUTSIDE
+    assert sp.first_solid(s, (0.1, 0.0, 0.01), 0.004) == sp.OUTSIDE
 
 
 def test_undo_puts_back_what_came_later(volume):
     s = volume.space()
-    sp.stamp(s, 0.0, 0.0, 0.012, 0.004, 3)
-    sp.stamp(s, 0.0, 0.0, 0.015, 0.004, 5)
+    sp.stamp(s, (0.0, 0.0, 0.012), 0.004, 3)
+    sp.stamp(s, (0.0, 0.0, 0.015), 0.004, 5)
     early = volume.tau <= 3
     volume.undo(3)
     np.testing.assert_array_equal(volume.tau != sp.SOLID, early)

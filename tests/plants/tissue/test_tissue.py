@@ -66,7 +66,8 @@ def test_channel_and_cap():
     assert volume.depth == pytest.approx(0.015 - np.sqrt(0.015**2 - 0.005**2), abs=1e-3)
 
 
-def test_the_proposed_access_is_the_best_of_those_tried():
+def test_the_proposed_access_is_the_best_of_those_tried(monkeypatch):
+    monkeypatch.setattr("systems.resection.planning.access.COARSE", 2e-3)
     proposal = propose_access(ball_tissue(), Access(), SnakeParams(), count=1)
     assert proposal.fraction > 0.6
     assert len(proposal.tried) == 2

@@ -167,6 +167,19 @@ def test_a_lost_sensor_stops_and_lets_go_again():
     assert steps(dut, 40, state)[FROZEN] == 0.0
 
 
+def test_an_estimate_that_is_no_number_counts_as_a_lost_sensor():
+    dut = law()
+    state = steps(dut, 3)
+    before = pivot(state).copy()
+    state = dut.step(state, p_WI=(np.nan, 0.0, 0.0))
+    assert permission(state).speed_scale == 0.0
+    state = steps(dut, 10, state, p_WI=(np.nan, 0.0, 0.0))
+    assert state[FROZEN] == Stop.SENSOR_LOST
+    assert np.isfinite(state).all()
+    np.testing.assert_array_equal(pivot(state), before)
+    assert steps(dut, 40, state)[FROZEN] == 0.0
+
+
 def test_unsure_means_slow_and_never_still():
     dut = law()
     assert steps(dut, 1)[SCALE] == 1.0

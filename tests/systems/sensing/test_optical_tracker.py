@@ -14,6 +14,7 @@ from systems.common.signal import size, vector, view
 from systems.common.signals import Shaft, TrackedShaft
 from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import (
+    TOOLS,
     MarkerBody,
     MarkerNoise,
     OpticalTracker,
@@ -25,10 +26,10 @@ from systems.sensing.optical_tracker import (
 PERIOD = 1.0 / 60.0
 
 
-def run(params, seconds, seed=None, tools="SO"):
+def run(params, seconds, seed=None, tools=TOOLS):
     """Frames read at the planner's instants, and the true shafts, by tool."""
     builder = DiagramBuilder()
-    tracker = builder.AddNamedSystem("tracker", OpticalTracker(params, tuple(tools)))
+    tracker = builder.AddNamedSystem("tracker", OpticalTracker(params, tools))
     logs = {}
     for tool, x in zip(tools, np.linspace(0.05, -0.05, len(tools)), strict=True):
         points = [[x, 0.0, -0.12], [x, 0.04, -0.12]]
@@ -62,7 +63,7 @@ def test_frame_arrives_at_the_first_instant_after_its_latency(latency, frames):
     logs = run(
         OpticalTrackerParams(latency=latency, body=MarkerBody(noise=0.0)), seconds=0.5
     )
-    for tool in "SO":
+    for tool in TOOLS:
         # Logged before the update of an instant: what its readers see.
         seen, true = logs[tool], logs[f"true {tool}"]
         assert not seen.valid[:frames].any()
@@ -123,7 +124,7 @@ def test_noise_is_that_of_a_fitted_marker_body():
 
 def test_seed_decides_the_noise():
     one, again, other = (
-        run(OpticalTrackerParams(), 0.3, seed)["O"] for seed in (5, 5, 6)
+        run(OpticalTrackerParams(), 0.3, seed)["obstacle"] for seed in (5, 5, 6)
     )
     np.testing.assert_array_equal(one.tip, again.tip)
     np.testing.assert_array_equal(one.u, again.u)
@@ -142,9 +143,9 @@ def test_any_number_of_tools_is_tracked():
 
 
 def test_blocked_tool_keeps_its_last_pose_and_is_invalid():
-    params = OpticalTrackerParams(losses=[SightLoss(0.2, 0.3, ["O"])])
+    params = OpticalTrackerParams(losses=[SightLoss(0.2, 0.3, ["obstacle"])])
     logs = run(params, 0.5, seed=1)
-    frames = logs["O"]
+    frames = logs["obstacle"]
     blocked = (frames.time >= 0.2 - 1e-9) & (frames.time < 0.3 - 1e-9)
     assert blocked.sum() == 6
     np.testing.assert_array_equal(frames.valid[2:], 1.0 - blocked[2:])
@@ -152,12 +153,12 @@ def test_blocked_tool_keeps_its_last_pose_and_is_invalid():
     for kept in (frames.tip, frames.u):
         np.testing.assert_array_equal(kept[blocked], np.tile(kept[before], (6, 1)))
     assert np.ptp(frames.time[blocked]) > 0.0
-    assert logs["S"].valid[2:].all()
+    assert logs["target"].valid[2:].all()
 
 
 def test_a_loss_that_names_no_tool_hides_all():
     logs = run(OpticalTrackerParams(losses=[SightLoss(0.2, 0.3)]), 0.5, seed=1)
-    for tool in "SO":
+    for tool in TOOLS:
         lost = logs[tool].valid[2:] == 0.0
         assert lost.sum() == 6
 
@@ -165,8 +166,8 @@ def test_a_loss_that_names_no_tool_hides_all():
 def test_shaft_that_is_not_finite_is_not_seen():
     tracker = OpticalTracker()
     context = tracker.CreateDefaultContext()
-    tracker.GetInputPort("S").FixValue(context, [math.nan, 0, -0.1, 0, 0, -1])
-    tracker.GetInputPort("O").FixValue(context, [0.0, 0, -0.1, 0, 0, -1])
+    tracker.GetInputPort("target").FixValue(context, [math.nan, 0, -0.1, 0, 0, -1])
+    tracker.GetInputPort("obstacle").FixValue(context, [0.0, 0, -0.1, 0, 0, -1])
     tracker.GetInputPort("noise").FixValue(context, np.zeros(12))
     update = tracker.EvalUniquePeriodicDiscreteUpdate(context)
     for group, valid in ((1, 0.0), (2, 1.0)):
@@ -189,7 +190,10 @@ def test_shaft_that_is_not_finite_is_not_seen():
         (OpticalTrackerParams(body=MarkerBody(spread=0.0)), "spread"),
         (OpticalTrackerParams(body=MarkerBody(lever=-0.3)), "lever"),
         (OpticalTrackerParams(losses=[SightLoss(2.0, 1.0)]), r"losses\[0\].end=1.0"),
-        (OpticalTrackerParams(losses=[SightLoss(1, 2, ["R"])]), "'R'.*S, O"),
+        (
+            OpticalTrackerParams(losses=[SightLoss(1, 2, ["R"])]),
+            "'R'.*target, obstacle",
+        ),
     ],
 )
 def test_bad_parameters_are_refused(params, message):

@@ -21,6 +21,7 @@ from systems.common.signal import Vector, flat, vector, view
 from systems.common.signals import Estimate, Shaft, TrackedShaft
 from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import (
+    TOOLS,
     MarkerBody,
     MarkerNoise,
     OpticalTracker,
@@ -283,11 +284,11 @@ def test_latency_is_made_up_for_in_the_diagram():
     )
     zeros = builder.AddNamedSystem("zeros", ConstantVectorSource(np.zeros(12)))
     dut = builder.AddNamedSystem("dut", TrajectoryEstimator())
-    for name in "SO":
+    for name in TOOLS:
         builder.Connect(tool.GetOutputPort("shaft"), tracker.GetInputPort(name))
     builder.Connect(zeros.get_output_port(), tracker.GetInputPort("noise"))
     builder.Connect(
-        tracker.GetOutputPort("O_measured"), dut.GetInputPort("measurement")
+        tracker.GetOutputPort("obstacle_measured"), dut.GetInputPort("measurement")
     )
     ports = dut.GetOutputPort("estimate"), tool.GetOutputPort("shaft")
     logs = [LogVectorOutput(port, builder, publish_period=DT) for port in ports]

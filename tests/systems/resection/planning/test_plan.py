@@ -1,5 +1,11 @@
 """Reach, planner and map on a small tumour, and the plan checked from outside."""
 
+import hashlib
+import os
+from pathlib import Path
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -10,14 +16,15 @@ from plants.tissue.tissue_carver import Carving
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.planner import Planner, PlannerParams
 from systems.resection.planning.reach import find_reach
-from systems.resection.wires.resection_ik import from_universal
 from tests.ball import ball_session
+
+ROOT = Path(__file__).parents[4]
 
 
 @pytest.fixture(scope="module")
 def planned():
     session = ball_session()
-    reach = find_reach(session)
+    reach = find_reach(session, effort=0.25)
     Planner(session, reach.mask, PlannerParams()).run()
     return session, reach
 
@@ -40,7 +47,7 @@ def test_plan_is_free_by_an_independent_check(planned):
     rng = np.random.default_rng(0)
     x = session.postures
     for time in rng.choice(len(x), 150, replace=False):
-        c = centreline(from_universal(x[time].tolist()), session.params)
+        c = centreline(x[time], session.params)
         near = np.linalg.norm(points - c[7], axis=1) <= session.params.tool_radius
         assert allowed[near].all()
         for ball in c[:6]:
@@ -61,10 +68,42 @@ def test_nothing_stands_out_between_the_checks(planned):
         assert hits == 0, f"on the way to posture {index + 1}"
 
 
+def digest() -> str:
+    """Of a whole plan, on voxels of 2 mm: reach with reasons, postures, space."""
+    session = ball_session(2e-3)
+    reach = find_reach(session, effort=0.1)
+    Planner(session, reach.mask, PlannerParams(budget=20_000)).run()
+    tree = session.tree.route[: len(session.postures)]
+    parts = [reach.mask, session.postures, tree, session.volume.tau]
+    content = b"".join(part.tobytes() for part in parts)
+    return hashlib.sha256(content + repr(reach.lumps).encode()).hexdigest()
+
+
 def test_same_seed_same_plan(planned):
-    _, reach = planned
-    again = ball_session()
-    assert find_reach(again).fraction == reach.fraction
+    """In any process, after other searches, fast or slow, whatever hashes are."""
+    program = f"from {__name__} import digest; print(digest())"
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", program],
+            env=os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)},
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for seed in ("1", "2")  # at the same time: they slow each other down
+    ]
+    plans = [process.communicate()[0].strip() for process in both]
+    assert plans == [digest()] * 2
+
+
+def test_the_budget_counts_steps():
+    session = ball_session(2e-3)
+    params = PlannerParams(budget=1000, candidates=1)
+    planner = Planner(session, session.volume.allowed > 0, params)
+    planner.run()
+    assert planner.tried == params.budget
+    assert planner.share < params.target
+    assert session.steps[-1].kind == "home"
 
 
 def test_map_says_where(planned):

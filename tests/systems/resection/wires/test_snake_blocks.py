@@ -8,28 +8,28 @@ import pytest
 from plants.snake.actuation import length_range, wire_lengths
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.elastic_wires import ElasticWires, ElasticWiresParams, WireBreak
-from plants.snake.inverse_kinematics import BEND, LAST_BEND
-from plants.snake.kinematics import forward, frames, to_universal
+from plants.snake.inverse_kernels import BEND, LAST_BEND
+from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS
 from plants.snake.weight import weight
 from systems.common.parameter import check
 from systems.resection.wires.resection_ik import (
     HOLD,
-    Motion,
     ResectionIk,
     ResectionIkParams,
-    from_universal,
+    follow,
+    standing,
     time_between,
-    universal,
 )
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tip_reference import (
     CircleParams,
+    PoseParams,
     TipReference,
     TipReferenceParams,
-    ToolPose,
-    circle_pose,
+    circle_target,
     reference,
 )
 from systems.resection.wires.wire_drums import WireDrums, WireDrumsParams
@@ -42,7 +42,8 @@ from systems.resection.wires.wire_tension import WireTension, WireTensionParams
 from systems.resection.wires.wire_watch import WireWatch, WireWatchParams
 
 SNAKE = SnakeParams()
-POSTURE = [0.01, 0.4, 0.3, -1.2, 0.5, 2.5, 0.7]
+BENDS = [0.01, 0.4, 0.3, -1.2, 0.5, 2.5, 0.7]
+POSTURE = posture_of(BENDS)
 STRAIGHT = [*wire_lengths(np.zeros(7), SNAKE), 0.0]
 
 
@@ -65,21 +66,14 @@ def tick(dut, context):
 
 
 def plant_state(posture):
-    x = universal(posture)
     state = np.zeros(2 * POSITIONS)
-    state[NEAR], state[FAR] = x, x[1:]
+    state[NEAR], state[FAR] = posture, posture[1:]
     return state
 
 
-def target_of(q):
-    X_WT, X_WI = forward(q, SNAKE), frames(q, SNAKE)[2]
+def target_of(x):
+    X_WT, X_WI = forward(x, SNAKE), frames(x, SNAKE)[2]
     return [*X_WT[:3, 3], *X_WT[:3, 2], *X_WI[:3, 2]]
-
-
-def test_universal_coordinates_go_there_and_back():
-    np.testing.assert_allclose(from_universal(universal(POSTURE)), POSTURE, atol=1e-14)
-    a, b = to_universal(POSTURE[1::2], POSTURE[2::2])
-    np.testing.assert_allclose(universal(POSTURE)[1:], np.stack([a, b], 1).ravel())
 
 
 def test_resection_ik_approaches_a_far_target_smoothly_and_meets_it():
@@ -88,23 +82,24 @@ def test_resection_ik_approaches_a_far_target_smoothly_and_meets_it():
     context = fixed(dut, target=target_of(POSTURE))
     rows = [np.zeros(7)]
     for _ in range(200):
-        rows.append(np.array(universal(out(dut, context, "posture").tolist())))
+        rows.append(np.array(out(dut, context, "posture")))
         tick(dut, context)
     steps = np.abs(np.diff(rows, axis=0))
     assert steps[:, 1:].max() <= params.bend_rate * params.period * 1.001
     assert steps[:, 0].max() <= params.travel_rate * params.period * 1.001
     assert steps[0].max() < 0.1 * steps.max()  # it starts gently
-    np.testing.assert_allclose(from_universal(rows[-1]), POSTURE, atol=1e-9)
+    np.testing.assert_allclose(rows[-1], POSTURE, atol=1e-9)
 
 
 def test_a_slow_goal_is_met_exactly():
     params = ResectionIkParams()
-    motion = Motion([0.0] * 7, [0.0] * 7, [0.0] * 7)
+    motion = standing(np.zeros(7))
     for k in range(1, 50):
-        goal = [0.0, *[0.5 * params.bend_rate * params.period * k] * 6]
-        motion = motion.follow(goal, params)
+        goal = np.array([0.0, *[0.5 * params.bend_rate * params.period * k] * 6])
+        motion = follow(motion, goal, params)
         np.testing.assert_allclose(motion.x, goal, atol=1e-15)
-    assert time_between(motion.x, [0.03, *motion.x[1:]], params) == pytest.approx(1.0)
+    shift = np.array([params.travel_rate, *[0.0] * 6])
+    assert time_between(motion.x, motion.x + shift, params) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -132,19 +127,19 @@ def test_inverse_and_forward_actuation_undo_each_other():
     np.testing.assert_allclose(out(forth, context, "posture"), POSTURE, atol=1e-10)
     assert np.abs(out(forth, context, "residual")).max() < 1e-12
     desired = out(forth, context, "desired_state")
-    np.testing.assert_allclose(desired, [*universal(POSTURE), *[0.0] * 7], atol=1e-10)
+    np.testing.assert_allclose(desired, [*POSTURE, *[0.0] * 7], atol=1e-10)
 
 
-def test_forward_actuation_leads_by_lag_and_hold():
+def test_forward_actuation_leads_by_lag_and_period():
     drive = SnakeDriveParams()
-    dut = WireForwardActuation(hold=0.02)
+    dut = WireForwardActuation(period=0.02)
     later = np.array(POSTURE) + 1e-3 * np.array([1, 0.1, 0.2, 0.1, -0.2, 0, 0.1])
     one = np.array([*wire_lengths(POSTURE, SNAKE), POSTURE[0]])
     two = np.array([*wire_lengths(later, SNAKE), later[0]])
     lead = drive.kd / drive.kp + 0.02
     context = fixed(dut, lengths=one, rates=(two - one) / lead)
     desired = out(dut, context, "desired_state")
-    np.testing.assert_allclose(desired[1:7], universal(later)[1:], atol=1e-6)
+    np.testing.assert_allclose(desired[1:7], later[1:], atol=1e-6)
 
 
 def test_sag_is_made_up_for():
@@ -152,11 +147,11 @@ def test_sag_is_made_up_for():
     inverse, forth = WireInverseActuation(), WireForwardActuation()
     drums = out(inverse, fixed(inverse, posture=POSTURE), "drums")
     context = fixed(forth, lengths=drums, rates=np.zeros(10))
-    lifted = np.array(universal(out(forth, context, "posture").tolist()))
+    lifted = out(forth, context, "posture")
     drive = SnakeDriveParams()
     gains = np.array([drive.travel_kp, *[drive.kp] * 6])
-    load = weight(universal(POSTURE), SNAKE, drive)
-    np.testing.assert_allclose(gains * (lifted - universal(POSTURE)), -load, atol=1e-9)
+    load = weight(POSTURE, SNAKE, drive)
+    np.testing.assert_allclose(gains * (lifted - POSTURE), -load, atol=1e-9)
 
 
 def test_pretension_is_wound_in():
@@ -217,6 +212,7 @@ def test_location_is_the_kinematics():
     dut = SnakeLocation()
     context = fixed(dut, state=plant_state(POSTURE))
     np.testing.assert_allclose(out(dut, context, "posture"), POSTURE, atol=1e-14)
+    np.testing.assert_allclose(out(dut, context, "bends"), BENDS, atol=1e-14)
     X_WT = forward(POSTURE, SNAKE)
     expected = [*X_WT[:3, 3], *X_WT[:3, 2]]
     np.testing.assert_allclose(out(dut, context, "tool"), expected, atol=1e-14)
@@ -272,21 +268,21 @@ def test_reference_circle():
     circle = CircleParams(p_WC=[0.0, 0.01, 0.04], n_WT=[0.0, 1.0, 1.0])
     n = np.array(circle.n_WT) / math.sqrt(2)
     for time in np.linspace(0.0, 5.0, 40):
-        v = np.array(circle_pose(circle, time))
-        offset = v[:3] - circle.p_WC
+        target = circle_target(circle, time)
+        offset = np.subtract(target.p, circle.p_WC)
         assert np.linalg.norm(offset) == pytest.approx(circle.radius)
         assert offset @ n == pytest.approx(0.0, abs=1e-15)
-        assert math.acos(v[6:] @ n) == pytest.approx(circle.lean)
-    full = np.array(circle_pose(circle, 5.0)) - circle_pose(circle, 1.0)
-    np.testing.assert_allclose(full, 0.0, atol=1e-12)
+        assert math.acos(target.n_I @ n) == pytest.approx(circle.lean)
+    one, other = circle_target(circle, 1.0), circle_target(circle, 5.0)
+    np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 def test_reference_poses_take_turns():
-    poses = [ToolPose(p_WT=[0.0, 0.0, 0.04]), ToolPose(p_WT=[0.01, 0.0, 0.04])]
+    poses = [PoseParams(p_WT=[x, 0.0, 0.04]) for x in (0.0, 0.01)]
     params = TipReferenceParams(poses=poses, dwell=2.0, lead=0.02)
-    assert reference(params, 1.99)[0] == 0.0
-    assert reference(params, 2.0)[0] == 0.01
-    assert reference(params, 4.1)[0] == 0.0
+    assert reference(params, 1.99).p[0] == 0.0
+    assert reference(params, 2.0).p[0] == 0.01
+    assert reference(params, 4.1).p[0] == 0.0
     dut = TipReference(params)
     context = dut.CreateDefaultContext()
     context.SetTime(1.99)
@@ -320,11 +316,11 @@ def test_reference_poses_take_turns():
         (TipReferenceParams(dwell=0.0), "tip_reference.dwell=0.0 s: expected >= 0.1"),
         (TipReferenceParams(lead=-1.0), "tip_reference.lead=-1.0 s"),
         (
-            TipReferenceParams(poses=[ToolPose(n_WT=[0.0, 0.0, 0.0])]),
+            TipReferenceParams(poses=[PoseParams(n_WT=[0.0, 0.0, 0.0])]),
             r"poses\[0\].n_WT=.*expected a direction",
         ),
         (
-            TipReferenceParams(poses=[ToolPose(p_WT=[0.0])]),
+            TipReferenceParams(poses=[PoseParams(p_WT=[0.0])]),
             r"poses\[0\].p_WT=.*expected 3 numbers",
         ),
     ],
