@@ -16,6 +16,12 @@ def test_mutated_scenarios_are_run_able_or_refused(tmp_path):
     assert found.accepted > 25
 
 
+@pytest.mark.study
+def test_very_many_mutated_scenarios(tmp_path):
+    found = fuzz(20_000, 0, tmp_path)
+    assert not (found.escaped or found.absurd), str(found)
+
+
 @pytest.mark.parametrize("name", list(scenario_files()))
 def test_no_number_is_without_bounds(name):
     checked = 0
