@@ -37,7 +37,7 @@ def get_study(name: Any) -> Study:
     Raises:
         ScenarioError: If there is none; the nearest name is in the message.
     """
-    if name not in STUDIES:
+    if not isinstance(name, str) or name not in STUDIES:
         raise ScenarioError(f"system={name!r}: {nearest(str(name), STUDIES)}")
     return STUDIES[name]
 
@@ -76,6 +76,10 @@ def load_scenario(
         tree["seed"] = seed
     if duration is not None:
         tree["duration"] = duration
+    if tree["system"] != study.name:
+        raise ScenarioError(
+            f"system={tree['system']!r}: expected {study.name!r}, as in {path}"
+        )
     study.gather(tree)
     settle(schema, tree, Path.cwd())
     for key in study.required:
@@ -87,9 +91,13 @@ def load_scenario(
 
 def check_scenario(scenario: Any) -> None:
     """Holds every value against its declaration, then the study's rules."""
+    study = get_study(scenario.system)
+    if not isinstance(scenario, study.scenario):
+        kind = type(scenario).__name__
+        raise ScenarioError(f"system={study.name!r}: a {kind} is of another system")
     with refusals():
         check(scenario, "")
-        get_study(scenario.system).check(scenario)
+        study.check(scenario)
 
 
 def build(case: Any) -> Any:

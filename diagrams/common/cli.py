@@ -174,8 +174,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command line.
 
     Returns:
-        0 when the scenario ran to its end, 1 when it did not, 2 for bad input, 130
-        if it was interrupted before it began.
+        0 when the scenario ran to its end, 1 when it did not or something failed
+        then, 2 if it could not begin, 130 if it was interrupted before it began.
     """
     logging.getLogger("drake").setLevel(logging.WARNING)
     arguments = make_parser().parse_args(argv)
@@ -183,6 +183,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return COMMANDS[arguments.command](arguments)
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
+        return 2
+    except Exception as error:
+        if sys.flags.dev_mode:  # `python -X dev -m diagrams` shows where
+            raise
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        print(f"trocar: error: {reason}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("trocar: interrupted before the run began", file=sys.stderr)

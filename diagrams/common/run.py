@@ -133,6 +133,7 @@ def prepare(scenario: Any, progress: Progress = silent) -> Case:
     study = get_study(scenario.system)
     with refusals():
         case = study.prepare(scenario, progress)
+    check_log(study.signals(scenario), study.length(case), study.log_period)
     for name, other in study.companions(scenario).items():
         beside = simulate(other, progress=progress_of(name, progress))
         if beside.error.endswith(INTERRUPTED):
@@ -179,9 +180,6 @@ def simulate_diagram(
         meshcat: As for `simulate`.
         progress: As for `simulate`.
         save: Called once there is all that was logged, before it is measured.
-
-    Raises:
-        ScenarioError: If the log would be too large.
     """
     case = scenario if isinstance(scenario, Case) else prepare(scenario, progress)
     study = get_study(case.scenario.system)
@@ -189,7 +187,6 @@ def simulate_diagram(
     station = builder.AddNamedSystem("station", diagram)
     logged = study.signals(case.scenario)
     duration = study.length(case)
-    check_log(logged, duration, study.log_period)
     sink = add_log(builder, station, logged, study.log_period)
     speed = replay_speed(study, duration)
     recorder = replay.add_recorder(builder, station, meshcat, study, speed)

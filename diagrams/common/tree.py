@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from diagrams.common.scenario import ScenarioError, nearest
+from systems.common.archive import read_regular
 
 BOOL = "tag:yaml.org,2002:bool"
 NAMED = "tools"
@@ -19,8 +20,34 @@ SWITCHES = {"yes": True, "on": True, "no": False, "off": False}
 """Texts that are true or false where that is wanted, and only there."""
 
 
+MOST_VALUES = 100_000
+"""Of one text in YAML, with every alias written out."""
+
+LARGEST_FILE = 1_000_000
+"""Of a scenario, in bytes."""
+
+
+def _weight(node: Any, known: dict[int, float]) -> float:
+    """Number of values in a node with every alias written out."""
+    if id(node) not in known:
+        known[id(node)] = math.inf  # where it is within itself
+        parts = [] if isinstance(node, yaml.ScalarNode) else node.value
+        if isinstance(node, yaml.MappingNode):
+            parts = [part for pair in parts for part in pair]
+        known[id(node)] = 1 + sum(_weight(part, known) for part in parts)
+    return known[id(node)]
+
+
 class _Reader(yaml.SafeLoader):
     """Reads YAML: no key twice, and of plain words only true and false are no text."""
+
+    def get_single_node(self) -> Any:
+        node = super().get_single_node()
+        if node is not None and _weight(node, {}) > MOST_VALUES:
+            raise yaml.YAMLError(
+                f"expected at most {MOST_VALUES} values, every alias written out"
+            )
+        return node
 
     yaml_implicit_resolvers = {
         first: [(tag, pattern) for tag, pattern in kinds if tag != BOOL]
@@ -58,6 +85,8 @@ def read_yaml(data: str | bytes, source: str) -> Any:
         mark = error.problem_mark or error.context_mark
         line = f", line {mark.line + 1}" if mark else ""
         raise ScenarioError(f"{source}{line}: {error.problem}") from error
+    except RecursionError as error:
+        raise ScenarioError(f"{source}: lists or keys are nested too deep") from error
     except (yaml.YAMLError, ValueError) as error:  # no text, no such day, ...
         reason = " ".join(str(error).split())
         raise ScenarioError(f"{source}: {reason}") from error
@@ -70,7 +99,7 @@ def read_tree(path: Path) -> dict[str, Any]:
         ScenarioError: If it is unreadable or not a map of keys to values.
     """
     try:
-        data = path.read_bytes()
+        data = read_regular(path, LARGEST_FILE)
     except OSError as error:
         raise ScenarioError(f"cannot read {path}: {error.strerror}") from error
     tree = read_yaml(data, f"cannot read {path}")
@@ -110,7 +139,7 @@ def require(tree: dict[str, Any], key: str, path: Path) -> None:
     node: Any = tree
     for part in key.split("."):
         named = {tool["name"]: tool for tool in tree.get(NAMED, ())}
-        if part not in node and node is tree and part in named:
+        if node is tree and part not in node and part in named:
             node = named[part]
         elif isinstance(node, dict) and part in node:
             node = node[part]
@@ -244,10 +273,13 @@ def _number(value: Any, refuse: typing.Callable[[str], typing.NoReturn]) -> floa
     """A finite number, also from a text: to YAML 1.1, `1e-3` is one."""
     try:
         number = float(value) if isinstance(value, str) else value
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            refuse("a number")
+        is_finite = math.isfinite(number)
+    except OverflowError:  # a whole number of hundreds of digits
+        is_finite = False
     except ValueError:
         refuse("a number")
-    if isinstance(number, bool) or not isinstance(number, int | float):
-        refuse("a number")
-    if not math.isfinite(number):
+    if not is_finite:
         refuse("a finite number")
     return number

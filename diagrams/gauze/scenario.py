@@ -162,7 +162,12 @@ def _check_tools(scenario: GauzeScenario) -> None:
                 "recording"
             )
         if tool.recording:
-            load_recording(tool.recording)
+            second = float(load_recording(tool.recording)[0][1])
+            if scenario.duration <= second:
+                raise ScenarioError(
+                    f"duration={scenario.duration} s: expected > {second:.4g} s, the "
+                    f"second sample of {tool.name}.recording; are its times in s?"
+                )
 
 
 def _check_fulcrums(scenario: GauzeScenario) -> None:

@@ -60,11 +60,15 @@ def gather(tree: dict[str, Any]) -> None:
     found: dict[str, Any] = {name: {"role": name} for name in ROLES}
     items = tree.pop("tools", [])
     for index, item in enumerate(items if isinstance(items, list) else [items]):
-        if not isinstance(item, dict) or not item.get("name"):
+        name = item.get("name") if isinstance(item, dict) else None
+        if not isinstance(name, str) or not name:
             raise ScenarioError(f"tools[{index}]={item!r}: expected keys, with a name")
-        found.setdefault(item["name"], {}).update(item)
+        found.setdefault(name, {}).update(item)
     for key in SHORT.keys() & tree.keys():
-        tree.setdefault(OBSTACLE, {})[SHORT[key]] = tree.pop(key)
+        told = tree.setdefault(OBSTACLE, {})
+        if not isinstance(told, dict):
+            raise ScenarioError(f"{OBSTACLE}={told!r}: expected keys and values")
+        told[SHORT[key]] = tree.pop(key)
     for name in found.keys() & tree.keys():
         told = tree.pop(name)
         if not isinstance(told, dict):

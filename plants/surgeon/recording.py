@@ -1,7 +1,8 @@
 """Recorded motions of a surgeon's tool: reading them, and making synthetic ones.
 
 A recording is a CSV file with the header `t,x,y,z`: time in s and the tool's tip in
-the world frame W (z up) in m. Other columns are ignored.
+the world frame W (z up) in m. A column in another unit is named with it: `t_ms`,
+`t_us`, `t_ns`; `x_mm`. Other columns are ignored. Time begins at the first sample.
 """
 
 import codecs
@@ -12,6 +13,8 @@ import math
 from pathlib import Path
 
 import numpy as np
+
+from systems.common.archive import read_regular
 
 COLUMNS = ("t", "x", "y", "z")
 
@@ -26,62 +29,68 @@ SWEEP_VIA = (
 `diagrams/gauze/recordings/obstacle_sweep.csv`: the obstacle tool works to and fro
 across the middle of the cavity."""
 
+_TIMES = {"": 1.0, "_s": 1.0, "_ms": 1e-3, "_us": 1e-6, "_ns": 1e-9}
+_LENGTHS = {"": 1.0, "_m": 1.0, "_mm": 1e-3}
+"""What follows a column's name, and what its numbers are multiplied by."""
+
+_LARGEST_FILE = 64_000_000  # bytes, of a day at 10 Hz
 _LARGEST_COORDINATE = 2.0  # m; beyond it the file is most likely in mm
+_LONGEST_INTERVAL = 1.0  # s between samples; beyond it times are most likely in ms
 
 
 def load_recording(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Reads a recorded tip motion.
 
     Args:
-        path: A CSV file, header `t,x,y,z`.
+        path: A CSV file, header `t,x,y,z`, or with units, e.g. `t_ms,x_mm,y_mm,z_mm`.
 
     Returns:
-        Times in s, shape (n,), strictly increasing, and p_WP in m, shape (n, 3).
+        Times in s since the first sample, shape (n,), strictly increasing, and p_WP in
+        m, shape (n, 3).
 
     Raises:
         ValueError: If the file cannot be read, lacks a column, holds something other
             than finite numbers, is not sorted by time, holds fewer than two samples,
-            or is in another unit than metres. The message names file and line.
+            or is in other units than its header says. The message names file and
+            line, and quotes no text of the file, which may be any file.
     """
     try:
-        data = Path(path).read_bytes()
+        data = read_regular(Path(path), _LARGEST_FILE)
         marked = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         text = data.decode("utf-16" if marked else "utf-8-sig")
         rows = list(csv.reader(io.StringIO(text, newline="")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"recording {path}: cannot be read: {error}") from error
-    header = [name.strip() for name in rows[0]] if rows else []
-    missing = [name for name in COLUMNS if name not in header]
-    if missing:
-        raise ValueError(
-            f"recording {path}: column {', '.join(missing)} missing; the header is "
-            f"{','.join(header)!r}, expected 't,x,y,z'"
-        )
-    index = [header.index(name) for name in COLUMNS]
+    except OSError as error:
+        reason = error.strerror
+        raise ValueError(f"recording {path}: cannot be read: {reason}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"recording {path}: cannot be read as CSV") from error
+    columns = _columns(path, [name.strip() for name in rows[0]] if rows else [])
     samples: list[list[float]] = []
+    first = 0.0
     for number, row in enumerate(rows[1:], start=2):
         if not row:
             continue  # an empty line, as at the end of many files
+        at = f"recording {path}, line {number}"
         try:
-            sample = [float(row[i]) for i in index]
+            raw = [float(row[index]) for index, _ in columns]
         except (ValueError, IndexError) as error:
             raise ValueError(
-                f"recording {path}, line {number}: {','.join(row)!r} is not a number "
-                f"in each of the columns t,x,y,z"
+                f"{at}: expected a number in each of the columns t,x,y,z"
             ) from error
-        if not all(map(math.isfinite, sample)):
-            raise ValueError(
-                f"recording {path}, line {number}: {','.join(row)!r} is not finite"
-            )
+        if not all(map(math.isfinite, raw)):
+            raise ValueError(f"{at}: {raw} is not finite")
+        first = raw[0] if not samples else first
+        raw[0] -= first  # before it is scaled: an epoch in ns has many digits
+        sample = [value * scale for value, (_, scale) in zip(raw, columns, strict=True)]
         if samples and not sample[0] > samples[-1][0]:
             raise ValueError(
-                f"recording {path}, line {number}: time {sample[0]} s does not follow "
-                f"{samples[-1][0]} s; times must increase from line to line"
+                f"{at}: time {sample[0]} s does not follow {samples[-1][0]} s; times "
+                "must increase from line to line"
             )
         if max(map(abs, sample[1:])) > _LARGEST_COORDINATE:
             raise ValueError(
-                f"recording {path}, line {number}: coordinates {sample[1:]} are over "
-                f"{_LARGEST_COORDINATE} m; are they in mm? expected m"
+                f"{at}: coordinates {sample[1:]} are over {_LARGEST_COORDINATE} m; are "
+                "they in mm? expected m, or columns x_mm,y_mm,z_mm"
             )
         samples.append(sample)
     if len(samples) < 2:
@@ -89,7 +98,29 @@ def load_recording(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
             f"recording {path}: {len(samples)} samples are too few, expected at least 2"
         )
     table = np.array(samples)
+    interval = float(np.median(np.diff(table[:, 0])))
+    if interval >= _LONGEST_INTERVAL:
+        raise ValueError(
+            f"recording {path}: samples are {interval:.4g} s apart, expected less than "
+            f"{_LONGEST_INTERVAL} s; are the times in ms? then the column is t_ms"
+        )
     return table[:, 0], table[:, 1:]
+
+
+def _columns(path: str | Path, header: list[str]) -> list[tuple[int, float]]:
+    """Where a recording's columns stand, and what their numbers are multiplied by."""
+    found = []
+    for name in COLUMNS:
+        units = _TIMES if name == "t" else _LENGTHS
+        places = [(name + unit, scale) for unit, scale in units.items()]
+        found.append([(header.index(n), scale) for n, scale in places if n in header])
+    wrong = [n for n, places in zip(COLUMNS, found, strict=True) if len(places) != 1]
+    if wrong:
+        raise ValueError(
+            f"recording {path}: column {', '.join(wrong)} missing, or there more than "
+            "once, expected 't,x,y,z', or with units, e.g. 't_ms,x_mm,y_mm,z_mm'"
+        )
+    return [places[0] for places in found]
 
 
 def save_recording(path: str | Path, times: np.ndarray, points: np.ndarray) -> None:

@@ -75,7 +75,7 @@ class Parameter:
         if isinstance(value, str | bool):
             return not self.choices or value in self.choices
         is_within = self.above < value and self.least <= value <= self.most
-        return math.isfinite(value) and is_within
+        return is_within and (isinstance(value, int) or math.isfinite(value))
 
 
 def parameter(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:

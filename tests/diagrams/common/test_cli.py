@@ -14,6 +14,9 @@ from diagrams.common.scenario import scenario_files
 SHORT = ["--duration", "0.2", "--no-replay"]
 
 
+LONG = "9" * 400
+
+
 def run(*arguments: str) -> int:
     """Runs the command line in this process."""
     return main([*arguments])
@@ -81,6 +84,16 @@ def test_set_changes_what_runs(tmp_path):
         (["run", "gauze_static", "--set", "duration=0"], "duration=0"),
         (["run", "gauze_static", "--set", "go_to_target.form=exact"], "corrected"),
         (["run", "gauze_static", "--set", "seed=1.5"], "whole number"),
+        (["run", "gauze_static", "--seed", str(2**64)], "seed=18446744073709551616"),
+        (["run", "gauze_static", "--set", "tracker={3: 1}"], "'tracker.3'"),
+        (["run", "gauze_static", "--set", "system=[gauze]"], "expected 'gauze'"),
+        (["run", "gauze_static", "--set", "system=wrist"], "expected 'gauze'"),
+        (["run", "gauze_static", "--set", "robot={3: 1}"], "missing key"),
+        (["run", "gauze_static", "--set", "tools=[{name: [1]}]"], "with a name"),
+        (["run", "gauze_static", "--set", f"duration={LONG}"], "finite number"),
+        (["run", "gauze_static", "--set", f"seed={LONG}"], "<= 9.22337e+18"),
+        (["run", "pwe_breathing", "--set", "duration=1e9"], "<= 100000"),
+        (["run", "pwe_breathing", "--set", "duration=1e5"], "GB"),
         (["diagram", "gauze_static", "--out", "picture.bmp"], ".svg or .png"),
     ],
 )
@@ -92,6 +105,15 @@ def test_bad_input_gets_one_clear_line(arguments, message, capsys, tmp_path):
     assert error.startswith("trocar: error: ")
     assert message in error
     assert error.count("\n") == 1
+
+
+def test_what_nobody_thought_of_is_one_line_too(monkeypatch, capsys):
+    def broken(arguments):
+        raise TypeError("unhashable\ntype")
+
+    monkeypatch.setitem(COMMANDS, "run", broken)
+    assert main(["run", "gauze_static"]) == 2
+    assert capsys.readouterr().err == "trocar: error: TypeError: unhashable type\n"
 
 
 def test_an_output_folder_that_cannot_be_written(tmp_path, capsys):

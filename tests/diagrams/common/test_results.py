@@ -2,6 +2,9 @@
 
 from dataclasses import replace
 import json
+import os
+from pathlib import Path
+import socket
 import subprocess
 import sys
 
@@ -10,8 +13,8 @@ import pytest
 
 from diagrams.common.cli import main
 from diagrams.common.log import first_fault
-from diagrams.common.replay import MOST_FRAMES, thinned
-from diagrams.common.results import LOCK, results
+from diagrams.common.replay import MOST_FRAMES, start_meshcat, thinned
+from diagrams.common.results import LOCK, results, save_scenario, with_data
 from diagrams.common.scenario import ScenarioError
 from diagrams.studies import STUDIES, build, load_scenario
 from systems.common import step_block
@@ -90,6 +93,69 @@ def test_the_log_outlives_what_is_made_of_it(what, tmp_path, monkeypatch, capsys
     log = np.genfromtxt(tmp_path / "signals.csv", delimiter=",", names=True)
     assert log["time"][-1] == pytest.approx(0.2)
     assert json.loads((tmp_path / "metrics.json").read_text())["duration"] == 0.2
+
+
+def moved(path, x):
+    """A recording of O that hardly moves."""
+    path.parent.mkdir(exist_ok=True)
+    rows = [f"{0.1 * k},{x},0.02,-0.1" for k in range(20)]
+    path.write_text("\n".join(["t,x,y,z", *rows]))
+    return path
+
+
+def test_recordings_are_kept_apart_from_results_and_from_each_other(tmp_path):
+    one = moved(tmp_path / "one/signals.csv", 0.01)
+    two = moved(tmp_path / "two/signals.csv", -0.01)
+    more = f"{{name: other, p_WG: [-0.05, 0.09, 0], recording: {two}}}"
+    settings = [f"recording={one}", f"tools=[{more}]"]
+    scenario = load_scenario("gauze_static", settings, duration=1.0)
+    told = {tool.name: tool.recording for tool in scenario.obstacles}
+    assert told == {"obstacle": str(one), "other": str(two)}
+    out = tmp_path / "out"
+    with results(out) as into:
+        saved = save_scenario(scenario, into)
+    copies = ["inputs/2/signals.csv", "inputs/signals.csv"]
+    assert names(out) == [LOCK, *copies, "scenario.yaml"]
+    assert (out / copies[0]).read_text() == two.read_text()
+    again = load_scenario(str(saved))  # and into the folder that it lies in
+    with results(out) as into:
+        save_scenario(again, into)
+    assert names(out) == [LOCK, *copies, "scenario.yaml"]
+    assert load_scenario(str(saved)) == again
+
+
+def test_a_header_takes_its_data_along_unless_they_are_elsewhere(tmp_path):
+    header, data = tmp_path / "liver.mhd", tmp_path / "liver.raw"
+    data.write_bytes(b"12345678")
+    for text, parts in (
+        ("NDims = 3\nElementDataFile = liver.raw\n", [header, data]),
+        ("NDims = 3\nElementDataFile = LOCAL\n", [header]),
+    ):
+        header.write_text(text)
+        assert with_data(header) == parts
+    for name in ("../../etc/passwd", "/etc/passwd", "LIST 2D"):
+        header.write_text(f"ElementDataFile = {name}\n")
+        with pytest.raises(ScenarioError, match="expected one file beside it"):
+            with_data(header)
+
+
+def test_what_is_no_regular_file_is_not_copied(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with results(tmp_path / "out") as into:
+        for source in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
+            with pytest.raises(ScenarioError, match="expected a regular file"):
+                into.copy(source, "inputs/pipe")
+
+
+def test_meshcat_listens_on_this_machine_alone():
+    meshcat = start_meshcat()
+    assert meshcat.web_url().startswith("http://localhost:")
+    with socket.socket() as stranger:
+        stranger.settimeout(2.0)
+        outside = socket.gethostbyname(socket.gethostname())
+        if not outside.startswith("127."):
+            with pytest.raises(OSError):
+                stranger.connect((outside, meshcat.port()))
 
 
 def test_a_signal_that_is_no_number_is_named():

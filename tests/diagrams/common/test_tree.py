@@ -176,3 +176,30 @@ def test_a_scenario_takes_what_people_write_and_keeps_it(tmp_path):
         assert loaded.wrist == "off" and loaded.compare == ["off", "known"]
         assert loaded.abdomen.stiffness == 2000.0
         assert loaded.description == "1e-3"
+
+
+BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 30)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (BOMB, "at most 100000 values"),
+        ("a: &a [*a]", "at most 100000 values"),
+        ("[" * 5000, "nested too deep"),
+        (f"a: {'9' * 5000}", "digits"),
+        ("? [1, 2]\n: 3", "unhashable"),
+    ],
+)
+def test_yaml_that_grows_is_refused(text, message):
+    with pytest.raises(ScenarioError, match=message):
+        read_yaml(text, "bomb")
+
+
+def test_a_file_that_is_no_scenario_by_its_size(tmp_path):
+    path = tmp_path / "large.yaml"
+    path.write_text("#" * 1_000_001)
+    with pytest.raises(ScenarioError, match=r"large\.yaml: 1000001 bytes"):
+        read_tree(path)

@@ -1,5 +1,6 @@
 """Recordings: what is read, what is refused, and the one that ships."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -38,9 +39,9 @@ def test_columns_may_stand_in_any_order_beside_others(tmp_path):
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 def test_a_byte_order_mark_is_no_part_of_the_header(tmp_path, encoding):
     path = tmp_path / "r.csv"
-    path.write_text("t,x,y,z\n0,0.3,0.2,-0.1\n1,0.3,0.2,-0.2\n", encoding=encoding)
+    path.write_text("t,x,y,z\n0,0.3,0.2,-0.1\n0.5,0.3,0.2,-0.2\n", encoding=encoding)
     times, points = load_recording(path)
-    assert times.tolist() == [0.0, 1.0]
+    assert times.tolist() == [0.0, 0.5]
     assert points[1].tolist() == [0.3, 0.2, -0.2]
 
 
@@ -49,8 +50,10 @@ def test_a_byte_order_mark_is_no_part_of_the_header(tmp_path, encoding):
     [
         ("", "column t, x, y, z missing"),
         ("t,x,y\n0,0,0\n", "column z missing.*expected 't,x,y,z'"),
-        ("t,x,y,z\n0,0,0,-0.1\n1,0,zero,-0.1\n", "line 3.*not a number"),
-        ("t,x,y,z\n0,0,0,-0.1\n1,0,0\n", "line 3.*not a number"),
+        ("t,t_ms,x,y,z\n0,0,0,0,0\n1,1,0,0,0\n", "column t .*more than once"),
+        ("t,x,y,z\n0,0,0,-0.1\n1,0,zero,-0.1\n", "line 3.*expected a number"),
+        ("t,x,y,z\n0,0,0,-0.1\n1,0,0\n", "line 3.*expected a number"),
+        ("t,x,y,z\n0,0,0,-0.1\n33,0,0,-0.1\n", "33 s apart.*t_ms"),
         ("t,x,y,z\n0,0,0,nan\n1,0,0,-0.1\n", "line 2.*not finite"),
         ("t,x,y,z\n0,0,0,-0.1\n0.2,0,0,-0.1\n0.1,0,0,-0.1\n", "line 4.*increase"),
         ("t,x,y,z\n0,0,0,-0.1\n0,0,0,-0.1\n", "line 3.*increase"),
@@ -63,6 +66,40 @@ def test_bad_recording_is_refused(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(ValueError, match=rf"(?s)bad\.csv.*{message}"):
         load_recording(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "epoch", "second", "metre"),
+    [("t,x,y,z", 1.7e9, 1, 1), ("t_ms,x_mm,y,z_m", 0, 1000, 1000)]
+    + [("t_ns,x,y,z", 1.7e18, 10**9, 1), ("t_s,x_m,y,z", 2.5, 1, 1)],
+)
+def test_time_begins_at_the_first_sample_in_the_header_s_units(
+    header, epoch, second, metre, tmp_path
+):
+    path = tmp_path / "r.csv"
+    rows = [f"{epoch + k * 0.5 * second:.3f},{0.3 * metre},0.2,-0.1" for k in range(3)]
+    path.write_text("\n".join([header, *rows]) + "\n")
+    times, points = load_recording(path)
+    np.testing.assert_allclose(times, [0.0, 0.5, 1.0], atol=1e-6)
+    np.testing.assert_allclose(points, np.tile([0.3, 0.2, -0.1], (3, 1)), atol=1e-12)
+
+
+def test_only_regular_files_are_read_and_none_is_quoted(tmp_path):
+    pipe, secret, huge = (tmp_path / name for name in ("pipe", "secret", "huge"))
+    os.mkfifo(pipe)
+    for path in (pipe, Path("/dev/zero")):
+        with pytest.raises(ValueError, match="no regular file"):
+            load_recording(path)
+    with huge.open("wb") as stream:
+        stream.truncate(10**10)
+    with pytest.raises(ValueError, match="10000000000 bytes, expected at most"):
+        load_recording(huge)
+    for text in ("admin:x:0\nadmin:hunter2", "t,x,y,z\nhunter2,hunter2"):
+        secret.write_text(text)
+        with pytest.raises(ValueError, match="expected") as refusal:
+            load_recording(secret)
+        assert "hunter2" not in str(refusal.value)
+        assert "admin" not in str(refusal.value)
 
 
 def test_unreadable_file_is_refused(tmp_path):

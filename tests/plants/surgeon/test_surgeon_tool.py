@@ -156,6 +156,6 @@ def test_parameters_come_from_yaml():
 
 def test_recording_above_the_fulcrum_is_refused(tmp_path):
     path = tmp_path / "high.csv"
-    path.write_text("t,x,y,z\n0,0,0,-0.1\n1,0,0,0.02\n")
-    with pytest.raises(ValueError, match=r"t=1\.000 s .*high\.csv.*above its fulcrum"):
+    path.write_text("t,x,y,z\n0,0,0,-0.1\n0.5,0,0,0.02\n")
+    with pytest.raises(ValueError, match=r"t=0\.500 s .*high\.csv.*above its fulcrum"):
         SurgeonTool(SurgeonToolParams(recording=str(path)))
