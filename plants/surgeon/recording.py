@@ -35,7 +35,7 @@ _LENGTHS = {"": 1.0, "_m": 1.0, "_mm": 1e-3}
 
 _LARGEST_FILE = 64_000_000  # bytes, of a day at 10 Hz
 _LARGEST_COORDINATE = 2.0  # m; beyond it the file is most likely in mm
-_LONGEST_INTERVAL = 1.0  # s between samples; beyond it times are most likely in ms
+_LONGEST_INTERVAL = 10.0  # s between samples; beyond it times are most likely in ms
 
 
 def load_recording(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
