@@ -1,5 +1,6 @@
 """The robot at the bedside: arm, instrument and abdomen in one continuous plant."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,7 @@ from plants.abdomen.scenery import add_scenery
 from plants.abdomen.wall_force import add_wall_force
 from plants.abdomen.wall_motion import WallMotionParams, add_wall_motion
 from plants.arm.arm import add_arm
+from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import BASE_POSITION
 from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
@@ -45,15 +47,21 @@ class Bedside:
         posture: Joint positions at the start (7) [rad].
         instrument: The robot's instrument.
         abdomen: The abdomen.
+        below: Model instances of all that hangs on the wrist's sensor.
     """
 
     systems: dict[str, Any]
     posture: np.ndarray
     instrument: Instrument
     abdomen: Abdomen
+    below: list[Any]
 
 
-def add_bedside(builder: Any, scenario: Any) -> Bedside:
+def add_bedside(
+    builder: Any,
+    scenario: Any,
+    hang: Callable[[Any, Any], list[Any]] = lambda plant, instrument: [],
+) -> Bedside:
     """Adds arm, instrument and abdomen to a diagram.
 
     The plant starts at rest, the shaft through the true fulcrum and unloaded.
@@ -62,6 +70,8 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
         builder: The diagram's builder.
         scenario: Has `robot`, `arm`, `instrument`, `abdomen`, `wall_motion` and
             `duration`.
+        hang: Adds what else hangs on the instrument to the plant that is not yet
+            finalized, and returns its model instances.
 
     Raises:
         ValueError: If the start cannot be reached.
@@ -75,13 +85,21 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
     abdomen = add_abdomen(
         plant, instrument.body.body_frame(), scenario.robot.p_WG, scenario.abdomen
     )
+    below = [instrument.instance, abdomen.sleeve_instance, *hang(plant, instrument)]
     add_scenery(plant, BASE_POSITION)
     plant.Finalize()
     connect_poses(builder, plant, scene_graph)
     moved = motion.displacement(0.0)
     p_WG = np.add(scenario.robot.p_WG, moved)
+    known = plant
+    if plant.num_constraints():  # couplers would be constraints to the solver as well
+        known = make_controller_plant(instrument=scenario.instrument)
     posture = home_posture(
-        plant, arm, instrument.tip, p_WG.tolist(), scenario.robot.p_WP
+        known,
+        known.GetJointByName("joint1").model_instance(),
+        known.GetFrameByName(INSTRUMENT_TIP),
+        p_WG.tolist(),
+        scenario.robot.p_WP,
     )
     plant.SetDefaultPositions(arm, posture)
     plant.SetDefaultPositions(abdomen.wall_instance, moved)
@@ -95,7 +113,7 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
         "scene_graph": scene_graph,
         "wall_force": add_wall_force(builder, plant, abdomen, motion.stiffness_factor),
     }
-    return Bedside(systems, posture, instrument, abdomen)
+    return Bedside(systems, posture, instrument, abdomen, below)
 
 
 def stiffen(case: Any, station: Any, context: Any) -> None:

@@ -66,8 +66,7 @@ class Instrument:
         body: The rigid body, whose frame is the mount frame M: origin at the
             sensor, z along the shaft towards the tip.
         tip: The frame `instrument_tip`, axes as M's, origin at the tip.
-        sensor: The weld joint; `int(sensor.index())` is its place in the plant's
-            `reaction_forces`.
+        sensor: The weld joint, which the wrist's sensor sits in.
         shaft_geometry: The shaft's proximity geometry, None without SceneGraph.
         length: From the sensor to the tip, in m.
         params: What it was made from.
