@@ -18,6 +18,7 @@ from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
+from plants.instruments.tube import TubeParams, add_tube
 from systems.common.parameter import parameter
 
 
@@ -36,6 +37,10 @@ class ToolAtStart:
     p_WP: list[float] = parameter(
         [0.0, 0.0, -0.1], "its tip", "m", least=-0.5, most=0.5, shape=(3,)
     )
+
+
+THIN = (add_instrument, 0.0042)
+"""What adds an instrument, and the radius of its trocar in m."""
 
 
 @dataclass
@@ -79,11 +84,15 @@ def add_bedside(
     motion: WallMotionParams = scenario.wall_motion
     plant, scene_graph = add_plant_and_scene(builder)
     arm = add_arm(plant, params=scenario.arm)
-    instrument = add_instrument(
-        plant, plant.GetFrameByName("flange", arm), scenario.instrument
-    )
+    hung = scenario.instrument
+    add, bore = (add_tube, 0.0062) if isinstance(hung, TubeParams) else THIN
+    instrument = add(plant, plant.GetFrameByName("flange", arm), hung)
     abdomen = add_abdomen(
-        plant, instrument.body.body_frame(), scenario.robot.p_WG, scenario.abdomen
+        plant,
+        instrument.body.body_frame(),
+        scenario.robot.p_WG,
+        scenario.abdomen,
+        bore=bore,
     )
     below = [instrument.instance, abdomen.sleeve_instance, *hang(plant, instrument)]
     add_scenery(plant, BASE_POSITION)

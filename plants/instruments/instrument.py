@@ -6,6 +6,7 @@ expressed in it. Straight tools of 3 to 10 mm diameter and 200 to 450 mm length 
 usual; shaft bending is left out.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -82,7 +83,10 @@ class Instrument:
 
 
 def add_instrument(
-    plant: Any, frame: Any, params: InstrumentParams | None = None
+    plant: Any,
+    frame: Any,
+    params: InstrumentParams | None = None,
+    look: Callable[[Any, Any, Any], None] | None = None,
 ) -> Instrument:
     """Hangs the instrument on a frame of the plant through the wrist sensor.
 
@@ -95,6 +99,7 @@ def add_instrument(
         frame: What carries the sensor, for example the arm's `flange`; z along the
             instrument.
         params: Dimensions and masses.
+        look: Draws it, of plant, body and params; a gauze holder if None.
 
     Raises:
         ValueError: If a parameter cannot be.
@@ -114,7 +119,7 @@ def add_instrument(
             instance,
         )
     )
-    _draw(plant, body, params)
+    (look or _draw)(plant, body, params)
     geometry = None
     if plant.geometry_source_is_registered():
         length = params.length - params.mount_length

@@ -21,7 +21,7 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from plants.abdomen.abdomen import Abdomen
 from systems.common.block import Block
-from systems.common.signal import Field, Vector, flat, size
+from systems.common.signal import Field, Vector, size
 
 _STILL = (0.0, 0.0, 0.0)
 
@@ -127,8 +127,8 @@ class WristSensor(Block):
         X_WM = self._body.EvalPoseInWorld(own)
         R_MW = X_WM.rotation().matrix().T
         m = m - np.cross(X_WM.translation(), f)
-        felt = Felt(R_MW @ f, R_MW @ m, rate[6:9], rate[9:12], rate[12:])
-        return np.concatenate([moving, [time], flat(felt)])
+        felt = [R_MW @ f, R_MW @ m, rate[6:]]  # as `Felt` has them
+        return np.concatenate([moving, [time], *felt])
 
     def _loads(self, context: Any, own: Any) -> list[tuple[Any, Any, Any]]:
         """Place, torque and force in W of all that acts on the bodies below."""

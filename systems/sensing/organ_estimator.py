@@ -59,9 +59,9 @@ class OrganMotion(NamedTuple):
 class OrganEstimatorParams:
     """How the breath is learnt."""
 
-    breaths: float = parameter(12.0, "that the template remembers", above=0, most=100)
+    breaths: float = parameter(16.0, "that the template remembers", above=0, most=100)
     bandwidth: float = parameter(
-        1.0, "of the phase-locked loop", "rad/s", above=0, most=10
+        0.2, "of the phase-locked loop", "rad/s", above=0, most=10
     )
     offset_time: float = parameter(
         5.0, "time constant of the offset", "s", above=0, most=1e3
@@ -73,7 +73,11 @@ class OrganEstimatorParams:
         7e-4, "misfit over some frames that means alarm", "m", above=0, most=0.02
     )
     fits: float = parameter(
-        4e-4, "rms misfit at which a lost breath is found again", "m", above=0, most=0.02
+        4e-4,
+        "rms misfit at which a lost breath is found again",
+        "m",
+        above=0,
+        most=0.02,
     )
     start: float = parameter(
         2.0, "in which a template that was found comes in", "s", above=0, most=60
@@ -239,8 +243,10 @@ def begin(c: Any, z: Floats, rate: float) -> None:
     weights[:] = 0.0
     s[OMEGA] = rate
     for turn in range(4):
-        s[PHI] = 0.0 if turn == 0 else s[PHI] - s[OMEGA] * (
-            s[TIME] - rows[first % RECORD, 0]
+        s[PHI] = (
+            0.0
+            if turn == 0
+            else s[PHI] - s[OMEGA] * (s[TIME] - rows[first % RECORD, 0])
         )
         before = rows[first % RECORD, 0]
         for i in range(count):
@@ -260,9 +266,9 @@ def begin(c: Any, z: Floats, rate: float) -> None:
 
 
 @compiled
-def report(packed: Floats, z: Floats, time: float) -> Floats:
+def report(z: Floats, time: float) -> Floats:
     """The elements of `OrganMotion` at a time in s."""
-    c, s = packed[0], z[:TEMPLATE]
+    s = z[:TEMPLATE]
     T = z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
     out = np.zeros(9)
     ahead = max(0.0, time - s[TIME])
@@ -334,7 +340,7 @@ class OrganEstimator(Block):
 
             def calc(context: Any, lead: float = lead) -> Floats:
                 z = self._next.Eval(context)
-                return report(self._constants, z, context.get_time() + lead)
+                return report(z, context.get_time() + lead)
 
             self.signal_out(name, OrganMotion, calc, after)
         self.update_every(self._p.period, self._next.Eval)
@@ -359,5 +365,3 @@ class OrganEstimator(Block):
             begin(self._constants[0], z, fit.rate)
         elif count == RECORD and entries.std(axis=0).max() < self._p.noise:
             begin(self._constants[0], z, 0.25)
-
-

@@ -34,9 +34,17 @@ from systems.common.signal import example, flat, size, view
 from systems.common.signals import ShaftMotion, Wrench
 from systems.common.step_block import wired
 from systems.sensing import sensor_noise
-from systems.sensing.wrench_kernel import SILENCE, Fault, shaft_motion, wall_wrench
+from systems.sensing.wrench_kernel import (
+    NO_LOAD,
+    SILENCE,
+    Fault,
+    Load,
+    shaft_motion,
+    wall_wrench,
+)
 
 _NOWHERE = np.zeros(3)
+_UNLOADED = flat(NO_LOAD)
 _SHAFT = size(ShaftMotion)
 _ROW = _SHAFT + size(Wrench)
 
@@ -154,6 +162,8 @@ class ToolWrench(Block):
 
     Port ``body_spatial_velocities`` accepts the plant's port of that name.
 
+    Port ``load`` accepts the `Load` that slides along it; none without a wire.
+
     Port ``shaft`` emits the `ShaftMotion`.
 
     Port ``wrench`` emits the `Wrench`; silence while the sensor is lost or saturated.
@@ -192,7 +202,7 @@ class ToolWrench(Block):
         )
         # Where a number stands, the kernels take one of Drake's arrays as it is.
         self._move = wired(shaft_motion, 0, [], [9, 3, 3, 3], [ShaftMotion], False)
-        reading = [9, ShaftMotion, 3, 3, 3, 3, 3, Fault, 3, 3]
+        reading = [9, ShaftMotion, 3, 3, 3, 3, 3, Fault, 3, 3, Load]
         self._read = wired(wall_wrench, 1, [], reading, [Wrench], False)
         self._silence = flat(SILENCE)
         step = math.sqrt(p.period)
@@ -204,6 +214,7 @@ class ToolWrench(Block):
             zero = -np.array(noise) * before
         self._faults = (noise, drift, tuple(zero.tolist()))
         self._felt = self.signal_in("felt", Felt)
+        self._load = self.signal_in("load", Load)
         self._poses = self.DeclareAbstractInputPort(
             "body_poses", Value([RigidTransform()])
         )
@@ -216,6 +227,7 @@ class ToolWrench(Block):
         feeling = {
             self._motion.ticket(),
             self._felt.ticket(),
+            self._load.ticket(),
             self.time_ticket(),
         }
         if p.delay:
@@ -270,6 +282,7 @@ class ToolWrench(Block):
             sensor_noise.fault(p.seed, max(0, round(time / p.period)), self._faults),
             p_WC,
             felt.a_C,
+            self._load.Eval(context) if self._load.HasValue(context) else _UNLOADED,
         )
 
     def _push(self, context: Any) -> np.ndarray:
