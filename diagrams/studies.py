@@ -21,13 +21,16 @@ from diagrams.common.tree import (
     settle,
 )
 from diagrams.gauze.study import STUDY as GAUZE
+from diagrams.keyhole.study import STUDY as KEYHOLE
 from diagrams.navigation.study import STUDY as NAVIGATION
 from diagrams.resection.study import STUDY as RESECTION
 from diagrams.snake.study import STUDY as SNAKE
 from diagrams.wrist.study import STUDY as WRIST
 from systems.common.parameter import check
 
-STUDIES = {study.name: study for study in (GAUZE, NAVIGATION, WRIST, SNAKE, RESECTION)}
+STUDIES = {
+    study.name: study for study in (GAUZE, NAVIGATION, WRIST, SNAKE, RESECTION, KEYHOLE)
+}
 """A scenario's `system` and the study that runs it."""
 
 

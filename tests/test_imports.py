@@ -120,6 +120,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.resection.scenario",  # the planner's parameters
     }
     assert importers(arrows, "diagrams.resection.operation") == {
+        "diagrams.keyhole.operation",
         "diagrams.resection.console",
         "diagrams.resection.diagram",  # the case's type
         "diagrams.resection.study",
