@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import fnmatch
 import json
 import logging
+import os
 from pathlib import Path
 import sys
 
@@ -339,6 +340,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # `trocar keys ... | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except Exception as error:
         if sys.flags.dev_mode:  # `python -X dev -m diagrams` shows where
             raise

@@ -150,6 +150,8 @@ def in_words(key: str, value: Any) -> str:
     if not isinstance(value, int | float):
         return str(value)
     unit = FIGURES[key].unit if key in FIGURES else _UNITS.get(key, "")
+    if value == 0:
+        return f"0 {unit}".rstrip()
     for least, scale, name in _SCALES.get(unit, []):
         if abs(value) >= least:
             return f"{value * scale:.3g} {name}"
