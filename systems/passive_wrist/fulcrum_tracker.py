@@ -19,6 +19,7 @@ Four decisions keep it consistent where a plain extended Kalman filter is not:
 """
 
 from math import exp, log, pi, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -182,11 +183,11 @@ class FulcrumTracker:
         noise = p.force_noise / sqrt(self._every) / stiffness
         wave = self._waves(m, seen, axis)
         if wave is not None:
-            fit = fit_breathing(lateral, RECORD_PERIOD, p.harmonics, wave.rate)
+            same = fit_breathing(lateral, RECORD_PERIOD, p.harmonics, wave.rate)
             other = abs(log(2.0 * pi * wave.rate) - x[LN_OMEGA]) > _SAME_RATE
             u = seen.u[-1]
             if not known or other:
-                self._filter_again(z, record, fit, noise)
+                self._filter_again(z, record, same, noise)
                 scalars[LED] = 0.0
             self._lead(m, wave, u)
             return
@@ -224,7 +225,7 @@ class FulcrumTracker:
             m.scalars[WAVE] = wave.rate
             self._lead(m, wave, seen.u[-1])
 
-    def _waves(self, m: Memory, seen: Entry, axis: np.ndarray) -> WaveFit | None:
+    def _waves(self, m: Memory, seen: Any, axis: np.ndarray) -> WaveFit | None:
         """The bank's fit of the record, if it knows rate and depth."""
         turned = float(np.sqrt(np.mean(1.0 - (seen.u @ axis) ** 2)))
         # Every rate at once is work: seldom where the wall is understood.

@@ -14,11 +14,12 @@ of the maxima that are nearly the best. The fulcrum now is c + sum_k a_k.
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
-from systems.passive_wrist.fulcrum_kernels import RECORD_PERIOD, Entry
+from systems.passive_wrist.fulcrum_kernels import RECORD_PERIOD
 from systems.passive_wrist.fulcrum_step import HARMONICS
 
 RATES = np.geomspace(0.12, 0.50, 61)  # [Hz] 2.4 % apart
@@ -111,9 +112,9 @@ class _Sums:
     """A record, summed up for the fits at any rate."""
 
     def __init__(
-        self, params: FulcrumParams, record: Entry, stiffness: float, doubt: float
+        self, params: FulcrumParams, record: Any, stiffness: float, doubt: float
     ) -> None:
-        """Takes the entries' fields, shape (n, 3) each, and what is known of K."""
+        """Takes a view of an `Entry` (n, 3), and what is known of K."""
         u, self.origin = record.u, np.array(params.guess)
         u = u / np.linalg.norm(u, axis=1)[:, None]
         depth = np.maximum(((self.origin - record.p) * u).sum(axis=1), 0.02)[:, None]
@@ -193,7 +194,7 @@ class _Sums:
 
 def fit_waves(
     params: FulcrumParams,
-    record: Entry,
+    record: Any,
     stiffness: float,
     doubt: float,
     known: float = 0.0,
@@ -202,7 +203,7 @@ def fit_waves(
 
     Args:
         params: Noise, guess and its sigma.
-        record: Fields of the entries, the oldest first, shape (n, 3) each.
+        record: View of an `Entry`: p, u, f, m (n, 3), the oldest first.
         stiffness: K as believed, in N/m.
         doubt: Standard deviation of ln K.
         known: A rate in Hz: only rates near it are tried. 0 for all of the grid.
