@@ -8,10 +8,18 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.snake.kinematics import POINTS, corners
+from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import REST, Posture
-from plants.snake.snake_body import CULPRIT, OK, Body, between, body_of, check_body
+from plants.snake.snake_body import (
+    CULPRIT,
+    OK,
+    Body,
+    between,
+    body_of,
+    check_body,
+    place,
+)
 from plants.tissue.execution import Execution
 from plants.tissue.labels import CHANNEL, TUMOUR
 from plants.tissue.space import SOLID, Space, in_voxels, stamp
@@ -94,16 +102,16 @@ def carve(
         in m.
     """
     c, x, why = np.empty((POINTS, 3)), np.empty(7), np.empty(CULPRIT)
-    corners(x0, b.h, b.tool, c)
+    place(b, x0, c)
     p = xyz(c[7], 0)
-    corners(x1, b.h, b.tool, c)
+    place(b, x1, c)
     way = norm(sub(c[7], p))
     steps = max(1, math.ceil(way / pitch))
     tumour, healthy, hits = 0, 0, 0
     nearest = math.inf
     for n in range(1, steps + 1):
         between(x0, x1, n / steps, x)
-        corners(x, b.h, b.tool, c)
+        place(b, x, c)
         hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
         stamp(s, c[7], b.radius, time)
@@ -163,6 +171,7 @@ class Carving:
         self.done = done or Execution()
         if self.done.tau is not None:
             self.volume.tau[:] = self.done.tau
+            self.volume.refresh()
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
         self.body = body_of(params)
@@ -174,8 +183,8 @@ class Carving:
         """Carves from posture x0 to x1 as the index after `index`."""
         if index < self.latest:
             self.tau[(self.tau > index) & (self.tau != SOLID)] = SOLID
-            self.volume.roomy[:] = 0
-            self.space.used[:] = 0
+            self.volume.refresh()
+            self.space = self.volume.space()
         self.latest = index + 1
         return carve(
             self.space,

@@ -12,8 +12,14 @@ from typing import Any
 import numpy as np
 
 from plants.snake.inverse_kernels import REACHED, solve_tool
-from plants.snake.kinematics import POINTS, corners, link_axis
-from plants.snake.snake_body import Body, drive_far
+from plants.snake.kinematics import POINTS, link_axis
+from plants.snake.snake_body import (
+    Body,
+    axis_from_entry,
+    drive_far,
+    from_entry,
+    place,
+)
 from plants.tissue.space import (
     FREE,
     SOLID,
@@ -67,7 +73,8 @@ def distance2(p: Numbers, q: Numbers) -> float:
 @compiled
 def tool_posture(b: Body, p: Numbers, n: Numbers, m: Numbers, x: Any) -> bool:
     """The posture (7,) with the tool at p, its axis n, intermediate axis m."""
-    return solve_tool(p, n, m, b.h, b.tool, b.bend, (b.low, b.high), x) == REACHED
+    q, u, v = from_entry(b, p), axis_from_entry(b, n), axis_from_entry(b, m)
+    return solve_tool(q, u, v, b.h, b.tool, b.bend, (b.low, b.high), x) == REACHED
 
 
 @compiled
@@ -128,7 +135,7 @@ def grow(
             d = tilted(draws, (0.0, 0.0, 0.0), 1.0)
             q = along(v, b.radius * uniform(draws) ** (1 / 3), d)
             if first_forbidden(s, q, b.radius) == FREE:
-                there = count_solid(s, q, b.frees)
+                there = count_solid(s, q, b.frees, s.solid)
                 if there > most:
                     most, p = there, q
         tries[pick] += 1
@@ -144,7 +151,7 @@ def grow(
                 node = found[0]
             if way == 0 and close:
                 node = at_node  # from where it stands it need not go anywhere first
-            corners(t.x[node], b.h, b.tool, c)
+            place(b, t.x[node], c)
             spread = 0.5 * uniform(draws) ** 2
             n = tilted(draws, link_axis(c, 5, b.h), spread)
             m = tilted(draws, link_axis(c, 3, b.h), spread)

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.snake.kinematics import POINTS, corners
-from plants.snake.snake_body import CULPRIT, OK, body_of, check_body
+from plants.snake.kinematics import POINTS
+from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, place
 from plants.tissue.labels import BRAIN, CRITICAL, NAMES, TUMOUR
 from plants.tissue.space import FREE, SOLID, first_forbidden
 from plants.tissue.volume import Volume
@@ -229,7 +229,7 @@ def _reason(
         if not tool_posture(body, p, n, m, x):
             blame["beyond the robot's bends"] += 1
             continue
-        corners(x, body.h, body.tool, c)
+        place(body, x, c)
         if check_body(s, body, c, 0, why) == OK:
             blame[NO_WAY] += 3
             continue

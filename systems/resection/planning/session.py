@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.snake.kinematics import POINTS, corners
+from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import CULPRIT, OK, Body, body_of
+from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
 from plants.tissue.volume import Volume
@@ -102,7 +102,7 @@ class Session:
         self.body: Body = body_of(self.params, self.clearance, self.accuracy)
         self.home = home_posture(self.volume, self.params)
         c = np.empty((POINTS, 3))
-        corners(self.home, self.body.h, self.body.tool, c)
+        place(self.body, self.home, c)
         self.tree: Tree = new_tree(self.home, c[7], ROOM, ROOM)
         self.why = np.zeros(CULPRIT)
 
@@ -228,7 +228,7 @@ class Session:
     def _approach(self, s: Space, body: Body, x: NDArray[np.float64]) -> int:
         """Drives to a posture from the nearest node that has a free way to it."""
         c = np.empty((POINTS, 3))
-        corners(x, body.h, body.tool, c)
+        place(body, x, c)
         found, far = np.empty(STARTS, np.int64), np.empty(STARTS)
         nearest_nodes(self.tree, c[7], found, far)
         blamed, best, status = None, -1.0, LIMIT

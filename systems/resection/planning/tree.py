@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.kinematics import POINTS, corners
-from plants.snake.snake_body import OK, Body, drive
+from plants.snake.kinematics import POINTS
+from plants.snake.snake_body import OK, Body, drive, place
 from plants.tissue.space import Space, roll_back
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import dot, norm, sub
@@ -98,7 +98,7 @@ def add_node(t: Tree, b: Body, parent: int, x: Any) -> int:
     if node >= len(t.x):
         raise IndexError("the tree is full")
     c = np.empty((POINTS, 3))
-    corners(x, b.h, b.tool, c)
+    place(b, x, c)
     t.x[node], t.tip[node] = x, c[7]
     t.parent[node] = parent
     t.depth[node] = t.depth[parent] + 1
