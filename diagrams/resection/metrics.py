@@ -3,10 +3,12 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from plants.tissue.labels import BRAIN, CAP, CRITICAL
 from plants.tissue.space import SOLID
+from systems.resection.planning.session import STROKES, Session
 
 
 def carving_of(run: Any) -> Any:
@@ -25,6 +27,22 @@ def outside_depth(volume: Any) -> float:
     return float(depth[wrong].max() * volume.spacing)
 
 
+def freeing_runs(session: Session) -> list[NDArray]:
+    """Stretches of a plan in which every move frees tumour: how much each, in m3."""
+    volume = session.volume
+    gone = volume.tau[volume.resected & (volume.tau > 0)]
+    gains = np.bincount(gone, minlength=int(session.tree.size[1])) * volume.voxel
+    ends = np.flatnonzero(np.diff((gains > 0.0).astype(int), prepend=0, append=0))
+    return [gains[first:last] for first, last in ends.reshape(-1, 2)]
+
+
+def single_step_share(runs: list[NDArray]) -> float:
+    """Of what a plan removes, what single moves do between others that free nothing."""
+    whole = sum(float(run.sum()) for run in runs)
+    single = sum(float(run[0]) for run in runs if len(run) == 1)
+    return single / whole if whole > 0.0 else 0.0
+
+
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     session, reach = run.case.session, run.case.reach
@@ -32,7 +50,7 @@ def measure(run: Any) -> dict[str, Any]:
     nearest = float(touched.critical_distance[-1])
     error = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
     volume = session.volume.tumour_volume
-    steps = session.steps
+    steps, runs = session.steps, freeing_runs(session)
     cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
     return {
         "tumour_volume": volume,
@@ -45,8 +63,9 @@ def measure(run: Any) -> dict[str, Any]:
         "max_outside_depth": outside_depth(carving_of(run).volume),
         "min_critical_distance": nearest if nearest >= 0.0 else None,
         "body_collisions": int(touched.hits[-1]),
-        "procedures": sum(step.kind not in ("home", "finish") for step in steps),
-        "finishes": sum(step.kind == "finish" for step in steps),
+        "procedures": sum(step.kind not in ("home", STROKES) for step in steps),
+        "strokes": len(runs),
+        "single_step_share": single_step_share(runs),
         "planning_time": run.case.planning_time,
         "reach_time": reach.time,
         "execution_time": run.case.done.time + run.simulated,

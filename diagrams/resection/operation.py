@@ -163,9 +163,10 @@ def finish_plan(
     with progress("planning", "of what can be reached") as show:
         planner = Planner(
             session,
-            reach.mask,
+            reach,
             scenario.planner,
             lambda share: show(min(share, target), target),
+            replace(scenario.player, lead=scenario.period),
         )
         planner.run()
 

@@ -16,6 +16,7 @@ from plants.snake.kinematics import POINTS, chain
 from plants.snake.parameters import SnakeParams
 from plants.tissue.space import (
     FREE,
+    NEIGHBOUR,
     Space,
     body_solid,
     first_forbidden,
@@ -23,9 +24,11 @@ from plants.tissue.space import (
     plate_solid,
     roll_back,
     stamp,
+    voxel_of,
 )
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import Vector, along, dot, sub
+from systems.common.signal import vector
 
 OK = 0
 BODY = 1  # some part of the body meets tissue
@@ -118,7 +121,10 @@ def body_of(
         params.travel[1],
         SHANK_RADIUS + clearance,
         step,
-        *(tuple(map(float, X[:3, column])) for column in (3, 0, 1, 2)),
+        vector(X[:3, 3]),
+        vector(X[:3, 0]),
+        vector(X[:3, 1]),
+        vector(X[:3, 2]),
     )
 
 
@@ -230,6 +236,47 @@ def between(x0: Any, x1: Any, share: float, out: Any) -> None:
     """The posture at a share of the straight way; at 1 exactly x1."""
     for r in range(7):
         out[r] = x1[r] if share == 1.0 else x0[r] + share * (x1[r] - x0[r])
+
+
+@compiled
+def could_fit(s: Space, b: Body, c: Any) -> bool:
+    """Whether a body with corners c (8, 3) lies in what may ever be free.
+
+    Quick and not strict: where it says no, `check_body` never finds it free.
+    """
+    least = b.body / s.spacing - 2 * NEIGHBOUR
+    for link in range(5):
+        for n in range(4):
+            at = voxel_of(s, along(c[link], n / 4, sub(c[link + 1], c[link])))
+            if at >= 0 and s.inside[at] < least:
+                return False
+    at = voxel_of(s, c[5])
+    return at < 0 or s.inside[at] >= least
+
+
+@compiled
+def as_far_as_fits(s: Space, b: Body, x0: Any, x1: Any) -> bool:
+    """Shortens the way from x0 to x1, in place, to where the body could ever be.
+
+    Returns:
+        Whether a tenth of it is left.
+    """
+    c, x = np.empty((POINTS, 3)), np.empty(7)
+    place(b, x1, c)
+    if could_fit(s, b, c):
+        return True
+    low, high = 0.0, 1.0
+    for _ in range(5):
+        share = (low + high) / 2
+        between(x0, x1, share, x)
+        place(b, x, c)
+        if could_fit(s, b, c):
+            low = share
+        else:
+            high = share
+    between(x0, x1, low, x)
+    x1[:] = x
+    return low >= 0.1
 
 
 @compiled

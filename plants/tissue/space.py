@@ -8,8 +8,10 @@ from the start (the access channel), k where the k-th pose of the plan freed it,
 - a path once driven stays free, so the way back is always open.
 
 `solid` holds the same as bits, 64 voxels of a row in a word: most rows that a ball
-or a plate meets hold nothing solid, and one look tells. A speculation (a candidate procedure) writes to the same arrays and is rolled back
-from its journal. Voxel (i, j, k) has its centre at origin + spacing (i, j, k).
+or a plate meets hold nothing solid, and one look tells.
+
+A speculation (a candidate procedure) writes to the same arrays and is rolled back from
+its journal. Voxel (i, j, k) has its centre at origin + spacing (i, j, k).
 """
 
 import math
@@ -43,6 +45,7 @@ class Space(NamedTuple):
             known to be free, uint8.
         solid: Bit c % 64 of word (a ny + b) words + c // 64 is set where voxel
             (a, b, c) is solid, int64.
+        barred: The same where the tool may not be, int64.
         size: Voxels along x, y, z.
         words: Words of a row of `solid`.
         origin: Centre of voxel (0, 0, 0) in the channel frame W, in m.
@@ -60,6 +63,7 @@ class Space(NamedTuple):
     inside: Any
     roomy: Any
     solid: Any
+    barred: Any
     size: tuple[int, int, int]
     words: int
     origin: tuple[float, float, float]
@@ -111,11 +115,11 @@ def ones(word: int) -> int:
 
 
 @compiled
-def any_solid(s: Space, a: int, b: int, low: int, high: int) -> bool:
-    """Whether any of the voxels (a, b, low) to (a, b, high - 1) is solid."""
+def any_set(s: Space, plane: Any, a: int, b: int, low: int, high: int) -> bool:
+    """Whether any voxel (a, b, low) to (a, b, high - 1) is set in a plane of bits."""
     row = (a * s.size[1] + b) * s.words
     for w in range(low >> 6, (high + 63) >> 6):
-        if s.solid[row + w] & bits(w << 6, low, high):
+        if plane[row + w] & bits(w << 6, low, high):
             return True
     return False
 
@@ -191,7 +195,7 @@ def first_solid(s: Space, p: Numbers, rho: float) -> int:
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
-            if not any_solid(s, a, b, below, above):
+            if not any_set(s, s.solid, a, b, below, above):
                 continue
             first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
@@ -255,7 +259,7 @@ def plate_solid(s: Space, p: Numbers, n: Numbers, length: float, rho: float) -> 
     below, above = math.ceil(u[2] - half[2]), math.floor(u[2] + half[2]) + 1
     for a in range(math.ceil(u[0] - half[0]), math.floor(u[0] + half[0]) + 1):
         for b in range(math.ceil(u[1] - half[1]), math.floor(u[1] + half[1]) + 1):
-            if not any_solid(s, a, b, below, above):
+            if not any_set(s, s.solid, a, b, below, above):
                 continue
             row = (a * ny + b) * nz
             for c in range(below, above):
@@ -279,9 +283,12 @@ def first_forbidden(s: Space, p: Numbers, rho: float) -> int:
         return FREE
     if not on_grid(s, u, (r, r, r)):
         return OUTSIDE
+    below, above = span(u[2], r, s.size[2])
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
+            if not any_set(s, s.barred, a, b, below, above):
+                continue
             first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.allowed[c] == 0:
@@ -336,7 +343,7 @@ def stamp(s: Space, p: Numbers, rho: float, time: int) -> None:
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
-            if not any_solid(s, a, b, below, above):
+            if not any_set(s, s.solid, a, b, below, above):
                 continue
             first, last = row_span(s, u, left, a, b)
             for c in range(first, last):

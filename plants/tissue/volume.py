@@ -60,7 +60,7 @@ class Channel:
     """A further access channel of a volume.
 
     Attributes:
-        X_WE: Its frame E in W, z along it, the origin where it meets the tumour, (4, 4).
+        X_WE: Its frame E in W, z along it, the origin at the tumour's border, (4, 4).
         depth: Where it ends, z in E in m.
         time: Arrival time of what it frees.
     """
@@ -109,6 +109,7 @@ class Volume:
     inside: NDArray[np.float32] = field(init=False, repr=False)
     roomy: NDArray[np.uint8] = field(init=False, repr=False)
     solid: NDArray[np.int64] = field(init=False, repr=False)
+    barred: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.tau.size == 0:
@@ -118,11 +119,10 @@ class Volume:
             X = np.diag([self.spacing] * 3 + [1.0])
             X[:3, 3] = self.origin
             self.critical = Boxes(np.argwhere(self.labels == CRITICAL), X)
-        if self.critical is not None:
-            if self.to_critical.size == 0:
-                _, self.to_critical = cover(
-                    self.critical, self.origin, self.spacing, self.labels.shape
-                )
+        if self.critical is not None and self.to_critical.size == 0:
+            _, self.to_critical = cover(
+                self.critical, self.origin, self.spacing, self.labels.shape
+            )
         self._journals = journals(self.labels.size)
         self.allow()
         self.refresh()
@@ -181,6 +181,7 @@ class Volume:
             self.inside.reshape(-1),
             self.roomy.reshape(-1),
             self.solid,
+            self.barred,
             tuple(self.labels.shape),
             -(-self.labels.shape[2] // 64),
             (float(self.origin[0]), float(self.origin[1]), float(self.origin[2])),
@@ -204,6 +205,7 @@ class Volume:
     def allow(self) -> None:
         """Makes where the tool may be agree with the channels."""
         self.allowed = self.may_be_removed()
+        self.barred = as_bits(self.allowed == 0)
         self.inside = ndimage.distance_transform_edt(self.allowed).astype(np.float32)
 
     def bore(self, channel: Channel) -> None:

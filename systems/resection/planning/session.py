@@ -34,11 +34,14 @@ from systems.resection.planning.procedure import (
 from systems.resection.planning.sweep import LIMIT, posture_at, sweep_procedure
 from systems.resection.planning.tree import (
     Tree,
+    copied,
+    cut,
     extend,
     go_to,
     grown,
     nearest_nodes,
     new_tree,
+    tree_of,
 )
 
 ROOM = 60_000
@@ -46,6 +49,9 @@ ROOM = 60_000
 
 FORMAT = 2
 """Of a session's file; from 2 on it holds what is critical as the mask has it."""
+
+STROKES = "strokes"
+"""Kind of a step that is no procedure: see `strokes`."""
 
 STARTS = 24
 """Nodes from which a procedure's start is tried."""
@@ -57,7 +63,7 @@ class Step:
 
     Attributes:
         name: What it is called.
-        kind: "entry", "elementary", "volume", "finish" or "home".
+        kind: "entry", "elementary", "volume", "strokes" or "home".
         first: Its first visit in the route.
         last: One past its last visit.
         nodes: Nodes of the tree before it.
@@ -141,7 +147,7 @@ class Session:
         step = self.steps.pop()
         self.concluded = ""
         self.volume.undo(step.first - 1)
-        self.tree.size[:] = step.nodes, step.first
+        cut(self.tree, step.nodes, step.first)
         self.save_if_filed()
         return step
 
@@ -157,7 +163,7 @@ class Session:
 
     def _take_back(self, mark: tuple[int, int, int, int]) -> None:
         roll_back(self.volume.space(), mark[0], mark[1])
-        self.tree.size[:] = mark[2:]
+        cut(self.tree, *mark[2:])
 
     def make_room(self) -> None:
         """Sees to it that a step's nodes fit into the tree."""
@@ -272,6 +278,23 @@ class Session:
         go_to(self.volume.space(), self.body, self.tree, 0, self.why)
         self.record("home", "home", before)
 
+    def thought(self) -> "Session":
+        """The same as it stands now, to be gone on with without consequence."""
+        other = Session(
+            self.volume.thought(), self.params, self.clearance, self.accuracy
+        )
+        other.tree = copied(self.tree, ROOM, 4 * ROOM)
+        other.steps = list(self.steps)
+        return other
+
+    def adopt(self, thought: "Session") -> None:
+        """Makes what was done in thought part of the plan, and saves it."""
+        self.volume.tau[:] = thought.volume.tau
+        self.volume.refresh()
+        self.tree, self.steps = thought.tree, thought.steps
+        self.concluded = ""
+        self.save_if_filed()
+
     # What comes of it --------------------------------------------------------
 
     @property
@@ -358,13 +381,15 @@ def load_session(path: Path) -> Session:
     session = Session(
         volume, SnakeParams(**meta["params"]), meta["clearance"], meta["accuracy"]
     )
-    nodes, visits = len(arrays["x"]), len(arrays["route"])
-    tree = grown(session.tree, nodes, visits)
-    for name in ("x", "parent", "depth", "tip"):
-        getattr(tree, name)[:nodes] = arrays[name]
-    tree.route[:visits] = arrays["route"]
-    tree.size[:] = nodes, visits
-    session.tree = tree
+    session.tree = tree_of(
+        arrays["x"],
+        arrays["parent"],
+        arrays["depth"],
+        arrays["tip"],
+        arrays["route"],
+        ROOM,
+        ROOM,
+    )
     for row in meta["steps"]:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))

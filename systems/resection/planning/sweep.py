@@ -20,7 +20,7 @@ from plants.snake.snake_body import OK, Body, axis_from_entry, from_entry, place
 from plants.tissue.space import Space, roll_back
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import Vector, along, norm, sub, unit, xyz
-from systems.resection.planning.tree import Tree, extend, go_to, here, visit
+from systems.resection.planning.tree import Tree, cut, extend, go_to, here, visit
 
 LIMIT = 5
 """Status of a pose that the inverse kinematics does not reach."""
@@ -262,5 +262,5 @@ def try_procedure(
         sweep_procedure(s, b, t, n, length, spacing, widest, pitch, False, why)
         gain = s.used[0] - freed
     roll_back(s, freed, roomed)
-    t.size[0], t.size[1] = nodes, visits
+    cut(t, nodes, visits)
     return gain

@@ -21,6 +21,15 @@ DIRECT = 0.030
 """Longest way of the tool, in m, for which the straight line is tried first."""
 
 
+CELL = 2e-3
+"""Edge in m of the cells in which nodes are looked up by their tools."""
+
+CELLS = 1 << 14
+
+SHELLS = 6
+"""Cells looked through around a point, in each direction, before all nodes are."""
+
+
 class Tree(NamedTuple):
     """Nodes and route.
 
@@ -31,6 +40,8 @@ class Tree(NamedTuple):
         tip: Where the tool is there in m, (capacity, 3).
         route: Nodes in the order of their visits, int32.
         size: Nodes and route entries, int64 (2).
+        last: The latest node of each cell, int32 (CELLS); -1 if it has none.
+        earlier: The node of its cell before each one, int32 (capacity).
     """
 
     x: Any
@@ -39,6 +50,8 @@ class Tree(NamedTuple):
     tip: Any
     route: Any
     size: Any
+    last: Any
+    earlier: Any
 
 
 def new_tree(home: Any, tip: Any, nodes: int, visits: int) -> Tree:
@@ -50,9 +63,34 @@ def new_tree(home: Any, tip: Any, nodes: int, visits: int) -> Tree:
         np.zeros((nodes, 3)),
         np.zeros(visits, np.int32),
         np.array([1, 1]),
+        np.full(CELLS, -1, np.int32),
+        np.full(nodes, -1, np.int32),
     )
     tree.x[0], tree.tip[0] = home, tip
+    enlist(tree, 0)
     return tree
+
+
+def tree_of(
+    x: Any, parent: Any, depth: Any, tip: Any, route: Any, nodes: int, visits: int
+) -> Tree:
+    """A tree of nodes and a route, with room for so many more."""
+    tree = grown(new_tree(x[0], tip[0], 1, 1), len(x) + nodes, len(route) + visits)
+    for whole, part in ((tree.x, x), (tree.parent, parent), (tree.tip, tip)):
+        whole[: len(x)] = part
+    tree.depth[: len(x)] = depth
+    tree.route[: len(route)] = route
+    for node in range(1, len(x)):
+        enlist(tree, node)
+    tree.size[:] = len(x), len(route)
+    return tree
+
+
+def copied(tree: Tree, nodes: int, visits: int) -> Tree:
+    """A tree of its own, with room for so many more nodes and visits."""
+    n, m = tree.size
+    parts = tree.x[:n], tree.parent[:n], tree.depth[:n], tree.tip[:n]
+    return tree_of(*parts, tree.route[:m], nodes, visits)
 
 
 def grown(tree: Tree, nodes: int, visits: int) -> Tree:
@@ -73,7 +111,36 @@ def grown(tree: Tree, nodes: int, visits: int) -> Tree:
         more(tree.tip, n, nodes),
         more(tree.route, m, visits),
         tree.size,
+        tree.last,
+        more(tree.earlier, n, nodes),
     )
+
+
+@compiled
+def cell_of(i: int, j: int, k: int) -> int:
+    """Where a cell is found in `Tree.last`."""
+    return (i * 73856093 ^ j * 19349663 ^ k * 83492791) & (CELLS - 1)
+
+
+@compiled
+def enlist(t: Tree, node: int) -> None:
+    """Makes a node, the latest, one that is found by its tool."""
+    i = math.floor(t.tip[node, 0] / CELL)
+    j = math.floor(t.tip[node, 1] / CELL)
+    k = math.floor(t.tip[node, 2] / CELL)
+    cell = cell_of(i, j, k)
+    t.earlier[node], t.last[cell] = t.last[cell], node
+
+
+@compiled
+def cut(t: Tree, nodes: int, visits: int) -> None:
+    """Forgets all nodes and visits beyond these many."""
+    for node in range(t.size[0] - 1, nodes - 1, -1):
+        i = math.floor(t.tip[node, 0] / CELL)
+        j = math.floor(t.tip[node, 1] / CELL)
+        k = math.floor(t.tip[node, 2] / CELL)
+        t.last[cell_of(i, j, k)] = t.earlier[node]
+    t.size[0], t.size[1] = nodes, visits
 
 
 @compiled
@@ -103,6 +170,7 @@ def add_node(t: Tree, b: Body, parent: int, x: Any) -> int:
     t.parent[node] = parent
     t.depth[node] = t.depth[parent] + 1
     t.size[0] += 1
+    enlist(t, node)
     return node
 
 
@@ -185,12 +253,39 @@ def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
     for n in range(count):
         found[n] = -1
         far[n] = math.inf
+    a, b, c = math.floor(p[0] / CELL), math.floor(p[1] / CELL), math.floor(p[2] / CELL)
+    for shell in range(SHELLS + 1):
+        for i in range(a - shell, a + shell + 1):
+            for j in range(b - shell, b + shell + 1):
+                side = abs(i - a) == shell or abs(j - b) == shell
+                for k in range(c - shell, c + shell + 1, 1 if side else 2 * shell):
+                    node = t.last[cell_of(i, j, k)]
+                    while node >= 0:
+                        # A node of another cell may be listed with those of this.
+                        if (
+                            math.floor(t.tip[node, 0] / CELL) == i
+                            and math.floor(t.tip[node, 1] / CELL) == j
+                            and math.floor(t.tip[node, 2] / CELL) == k
+                        ):
+                            _rank(t, p, node, found, far)
+                        node = t.earlier[node]
+        if far[count - 1] <= (shell * CELL) ** 2:
+            return
+    for n in range(count):
+        found[n] = -1
+        far[n] = math.inf
     for node in range(t.size[0]):
-        d = sub((t.tip[node, 0], t.tip[node, 1], t.tip[node, 2]), p)
-        d2 = dot(d, d)
-        if d2 < far[count - 1]:
-            n = count - 1
-            while n > 0 and far[n - 1] > d2:
-                far[n], found[n] = far[n - 1], found[n - 1]
-                n -= 1
-            far[n], found[n] = d2, node
+        _rank(t, p, node, found, far)
+
+
+@compiled
+def _rank(t: Tree, p: Numbers, node: int, found: Any, far: Any) -> None:
+    """Puts a node among the nearest if it is one."""
+    d = sub((t.tip[node, 0], t.tip[node, 1], t.tip[node, 2]), p)
+    d2 = dot(d, d)
+    n = len(found) - 1
+    if d2 < far[n]:
+        while n > 0 and far[n - 1] > d2:
+            far[n], found[n] = far[n - 1], found[n - 1]
+            n -= 1
+        far[n], found[n] = d2, node
