@@ -189,6 +189,44 @@ def schedule(
     return profile(x, params, waits).times
 
 
+def posture_at(
+    x: NDArray[np.float64], times: NDArray[np.float64], time: float
+) -> NDArray[np.float64]:
+    """The posture (7,) at a time in s, of postures (n, 7) reached at times (n,)."""
+    n = int(np.searchsorted(times, time))
+    if n == 0 or n == len(times):
+        return x[min(n, len(x) - 1)]
+    share = (time - times[n - 1]) / (times[n] - times[n - 1])
+    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
+    return between
+
+
+def played(
+    x: NDArray[np.float64],
+    profile: Profile,
+    params: ProcedurePlayerParams,
+    time: float,
+) -> NDArray[np.float64]:
+    """The posture (7,) at a time in s, speeding up and slowing down between two."""
+    times, full, v, waits = profile
+    n = int(np.searchsorted(times, time))
+    if n == 0 or n == len(times):
+        return x[min(n, len(x) - 1)]
+    begin = times[n - 1] + waits[n - 1]
+    share = max(time - begin, 0.0) / (times[n] - begin)
+    turn = max(params.turn, params.lead)
+    share = way_share(full[n - 1], v[n - 1], v[n], turn, share)
+    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
+    return between
+
+
+def target_of(x: NDArray[np.float64], snake: SnakeParams) -> ToolTarget:
+    """The tool's pose of a posture (7,), with its intermediate axis."""
+    c, h = np.empty((POINTS, 3)), snake.half_pitch
+    corners(x, h, snake.tool_offset, c)
+    return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
+
+
 class ProcedurePlayer(Block):
     """Plays the postures of a plan, at the rates the robot can keep.
 
@@ -252,20 +290,8 @@ class ProcedurePlayer(Block):
 
     def target(self, time: float) -> ToolTarget:
         """The tool's pose at a time in s."""
-        n = int(np.searchsorted(self._times, time))
-        if n == 0 or n == len(self._times):
-            x = self._x[min(n, len(self._x) - 1)]
-        else:
-            before, after = self._times[n - 1], self._times[n]
-            _, full, v, waits = self._profile
-            begin = before + waits[n - 1]
-            share = max(time - begin, 0.0) / (after - begin)
-            turn = max(self._params.turn, self._params.lead)
-            share = way_share(full[n - 1], v[n - 1], v[n], turn, share)
-            x = self._x[n - 1] + share * (self._x[n] - self._x[n - 1])
-        c, h = np.empty((POINTS, 3)), self._snake.half_pitch
-        corners(x, h, self._snake.tool_offset, c)
-        return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
+        x = played(self._x, self._profile, self._params, time)
+        return target_of(x, self._snake)
 
     def _calc_target(self, context: Any) -> np.ndarray:
         return flat(self.target(context.get_time() + self._params.lead))
