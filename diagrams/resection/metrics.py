@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from plants.tissue.labels import BRAIN, CAP, CRITICAL
 from plants.tissue.space import SOLID
+from systems.resection.planning.next_entry import bored_healthy
 from systems.resection.planning.session import STROKES, Session
 
 
@@ -20,6 +21,8 @@ def carving_of(run: Any) -> Any:
 def outside_depth(volume: Any) -> float:
     """How deep into healthy tissue anything was removed, outside the channel, in m."""
     wrong = (volume.tau != SOLID) & np.isin(volume.labels, (BRAIN, CRITICAL))
+    for channel in volume.more:
+        wrong &= ~volume.tube(channel)
     if not wrong.any():
         return 0.0
     healthy = np.isin(volume.labels, (BRAIN, CRITICAL))
@@ -61,6 +64,8 @@ def measure(run: Any) -> dict[str, Any]:
         "resected_fraction": float(removed.tumour[-1]) / volume,
         "healthy_removed": float(removed.healthy[-1]),
         "max_outside_depth": outside_depth(carving_of(run).volume),
+        "entries": 1 + len(session.volume.more),
+        "bored_healthy": bored_healthy(session.volume),
         "min_critical_distance": nearest if nearest >= 0.0 else None,
         "body_collisions": int(touched.hits[-1]),
         "procedures": sum(step.kind not in ("home", STROKES) for step in steps),

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from plants.snake.last_module import meridian
 from plants.snake.parameters import SnakeParams
 from plants.tissue.labels import TUMOUR
@@ -27,7 +29,9 @@ def entry_pass(session: Session, bend: float, pitch: float, name: str) -> Proced
         name: What it is called.
     """
     volume, params = session.volume, session.params
-    deepest = float(volume.points(volume.labels == TUMOUR)[:, 2].max())
+    X_EW = np.linalg.inv(session.X_WE)
+    tumour = volume.points(volume.labels == TUMOUR)
+    deepest = float((tumour @ X_EW[2, :3] + X_EW[2, 3]).max())
     length = deepest - volume.depth + params.tool_radius
     travel = params.travel[1] - float(session.home[0])
     return Procedure(

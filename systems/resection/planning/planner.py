@@ -57,8 +57,9 @@ FALL = 0.7
 class PlannerParams:
     """How the planner goes about it."""
 
+    # Above 1, since the plan may find more than the search did.
     target: float = parameter(
-        1.0, "share of the reachable part at which it stops", above=0.0, most=1.0
+        1.005, "share of the reachable part at which it stops", above=0.0, most=1.2
     )
     pitch: float = parameter(
         2.0e-3, "of poses when carried out", "m", least=5e-4, most=6e-3
@@ -98,7 +99,7 @@ class PlannerParams:
     )
     # At first; every second one prices it at three times as much.
     worth: float = parameter(
-        0.5e-9,
+        1.0e-9,
         "tumour that may be left to save a second, when detours are left out",
         "m3",
         above=0.0,
@@ -202,7 +203,7 @@ class Planner:
     def library(self) -> Library:
         """Where strokes may begin: what the search found, or one made now."""
         if self.reach is not None:
-            return new_library(self.reach.x[1:], self.reach.parent[1:], 1)
+            return new_library(self.reach.x, self.reach.parent, self.reach.nodes)
         thought = self.session.thought()
         nodes = int(thought.tree.size[0])
         search(thought, new_draws(self.params.seed), 0.25)
@@ -253,7 +254,9 @@ class Planner:
     def enter(self) -> None:
         """The entry's passes, to the far end of the tumour, but those made before."""
         for number, bend in enumerate(self.params.passes):
-            name = "pilot entry" if number == 0 else f"entry {number + 1}"
+            name = "pilot entry" if number == 0 else f"entry pass {number + 1}"
+            if self.session.volume.more:
+                name += f", channel {1 + len(self.session.volume.more)}"
             procedure = entry_pass(self.session, bend, self.params.pitch, name)
             if not any(step.procedure == procedure for step in self.session.steps):
                 self.session.commit(procedure)

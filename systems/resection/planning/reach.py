@@ -75,8 +75,10 @@ class Reach:
         time: That the search took, in s.
         steps: Postures of its tree.
         lumps: What is not reached and why, largest first.
-        x: Those postures, (steps, 7).
-        parent: The one each was reached from, (steps,); -1 for home.
+        x: Postures beyond the nodes that the session's tree had, (n, 7).
+        parent: The node or posture each was reached from, (n,): numbered as in a
+            tree that has them after its own.
+        nodes: How many those nodes were.
     """
 
     mask: NDArray[np.bool_]
@@ -86,6 +88,7 @@ class Reach:
     lumps: list[Lump]
     x: NDArray[np.float64]
     parent: NDArray[np.int32]
+    nodes: int
 
 
 def find_reach(
@@ -94,21 +97,27 @@ def find_reach(
     effort: float = 1.0,
     explain: bool = True,
     progress: Callable[[float], None] = lambda share: None,
+    anew: bool = True,
 ) -> Reach:
-    """Computes the reachable part of a session's tumour from its beginning.
+    """Computes the reachable part of a session's tumour.
 
     Args:
-        session: Its volume and robot; what it has removed does not matter.
+        session: Its volume and robot.
         seed: Of the random steps.
         effort: Scales how long a search without success goes on.
         explain: Whether to say why the rest is not reached.
         progress: Called with the share of the tumour that is reached.
+        anew: From its beginning, through the first entry: what has been removed
+            does not matter. Otherwise from how things stand, through the entry in
+            which the robot is.
     """
     start = perf_counter()
-    scratch = Session(
-        session.volume.fresh(), session.params, session.clearance, session.accuracy
-    )
-    volume = scratch.volume
+    scratch = session.thought()
+    if anew:
+        scratch = Session(
+            session.volume.fresh(), session.params, session.clearance, session.accuracy
+        )
+    volume, first = scratch.volume, int(scratch.tree.size[0])
     for bend in (PILOT, session.params.max_bend):
         scratch.commit(entry_pass(scratch, bend, PITCH, "entry"))
     draws = new_draws(seed)
@@ -118,7 +127,7 @@ def find_reach(
     lumps = []
     if explain:
         opening = _opening(volume, scratch.body.radius)
-        lumps = _lumps(session, volume, opening, draws)
+        lumps = _lumps(scratch, volume, opening, draws)
     nodes = int(scratch.tree.size[0])
     return Reach(
         mask,
@@ -126,8 +135,9 @@ def find_reach(
         perf_counter() - start,
         nodes,
         lumps,
-        scratch.tree.x[:nodes].copy(),
-        scratch.tree.parent[:nodes].copy(),
+        scratch.tree.x[first:nodes].copy(),
+        scratch.tree.parent[first:nodes].copy(),
+        first,
     )
 
 
@@ -217,6 +227,7 @@ def load_reach(path: Path, session: Session, seed: int, effort: float) -> Reach 
         lumps,
         arrays["x"],
         arrays["parent"],
+        1,
     )
 
 

@@ -49,8 +49,8 @@ DRIVEN = 8
 SHORTEST, LONGEST = 0.04, 0.2
 """Time of a move in s."""
 
-WAIT = 20
-"""Strokes begun after which an edge that failed is tried again."""
+WAIT = 40
+"""Visits after which an edge that failed is tried again, before all others are."""
 
 WALL_WEIGHT = 2
 """What a voxel at the wall counts beyond one inside: it is harder to come by."""
@@ -91,8 +91,8 @@ class Library(NamedTuple):
         node: The node of the tree that has the posture, int32 (n); -1 while none has.
         gain: Bound of what they free, (n,).
         known: Visits made when it was measured, int64 (n).
-        retry: Strokes begun before which it is not tried, int64 (n).
-        nodes: Nodes of the tree when they were found, and strokes begun, int64 (2).
+        retry: Visits made when it failed last, int64 (n); -1 if it did not.
+        nodes: Nodes of the tree when they were found, int64 (1).
     """
 
     x: NDArray[np.float64]
@@ -119,8 +119,8 @@ def new_library(x: NDArray, parent: NDArray, nodes: int) -> Library:
         np.full(count, -1, np.int32),
         np.full(count, np.inf),
         np.full(count, -1, np.int64),
-        np.zeros(count, np.int64),
-        np.array([nodes, 0]),
+        np.full(count, -1, np.int64),
+        np.array([nodes]),
     )
 
 
@@ -295,12 +295,14 @@ def begin_stroke(
     Args as for `stroke_on`; lib is the library.
     """
     base = lib.nodes[0]
-    lib.nodes[1] += 1
+    wait = WAIT
     x = t.x[here(t)].copy()
     while True:
         pick, most, begin = -1, 0.0, -1
         for e in range(len(lib.x)):
-            if lib.node[e] >= 0 or lib.gain[e] <= 0.0 or lib.retry[e] > lib.nodes[1]:
+            if lib.node[e] >= 0 or lib.gain[e] <= 0.0:
+                continue
+            if lib.retry[e] >= 0 and lib.retry[e] + wait > t.size[1]:
                 continue
             parent = lib.parent[e]
             if parent >= base:
@@ -312,16 +314,29 @@ def begin_stroke(
             if rate > most:
                 pick, most, begin = e, rate, parent
         if pick < 0 or most < least:
-            return False
+            if wait == 1:
+                return False
+            wait = 1
+            continue
         if lib.known[pick] == t.size[1]:
             break
         freed, roomed = s.used[0], s.used[1]
-        status = drive(s, b, t.x[begin], lib.x[pick], t.size[1], why)
+        status, share = drive_far(s, b, t.x[begin], lib.x[pick], t.size[1], why)
         gain = weighed(s, g, freed)
         roll_back(s, freed, roomed)
         if status != OK:
-            lib.retry[pick] = lib.nodes[1] + WAIT
-            continue
+            lib.retry[pick] = t.size[1]
+            time = time_of(k, x, t.x[begin])
+            time += share * time_of(k, t.x[begin], lib.x[pick]) + 2 * k.turn
+            if gain / time < least:
+                continue
+            # Part of the way pays, too.
+            y = np.empty(7)
+            between(t.x[begin], lib.x[pick], share, y)
+            go_to(s, b, t, begin, why)
+            extend(s, b, t, begin, y, why)
+            v[:] = 0.0
+            return True
         lib.gain[pick], lib.known[pick] = gain, t.size[1]
         if gain == 0.0:
             lib.node[pick] = add_node(t, b, begin, lib.x[pick])
@@ -342,7 +357,7 @@ def begin_stroke(
         new = extend(s, b, t, begin, lib.x[pick], why)
         direction(k, t.x[begin], lib.x[pick], v)
     if new < 0:
-        lib.retry[pick] = lib.nodes[1] + WAIT
+        lib.retry[pick] = t.size[1]
     else:
         lib.node[pick] = new
     return True

@@ -39,7 +39,8 @@ class Tree(NamedTuple):
         depth: Edges up to home, int32 (capacity).
         tip: Where the tool is there in m, (capacity, 3).
         route: Nodes in the order of their visits, int32.
-        size: Nodes and route entries, int64 (2).
+        size: Nodes, route entries, and the home of the entry worked through: nodes
+            before it are of others, int64 (3).
         last: The latest node of each cell, int32 (CELLS); -1 if it has none.
         earlier: The node of its cell before each one, int32 (capacity).
     """
@@ -62,7 +63,7 @@ def new_tree(home: Any, tip: Any, nodes: int, visits: int) -> Tree:
         np.zeros(nodes, np.int32),
         np.zeros((nodes, 3)),
         np.zeros(visits, np.int32),
-        np.array([1, 1]),
+        np.array([1, 1, 0]),
         np.full(CELLS, -1, np.int32),
         np.full(nodes, -1, np.int32),
     )
@@ -72,25 +73,38 @@ def new_tree(home: Any, tip: Any, nodes: int, visits: int) -> Tree:
 
 
 def tree_of(
-    x: Any, parent: Any, depth: Any, tip: Any, route: Any, nodes: int, visits: int
+    x: Any,
+    parent: Any,
+    depth: Any,
+    tip: Any,
+    route: Any,
+    home: int,
+    nodes: int,
+    visits: int,
 ) -> Tree:
-    """A tree of nodes and a route, with room for so many more."""
+    """A tree of nodes and a route through its last home, with room for more."""
     tree = grown(new_tree(x[0], tip[0], 1, 1), len(x) + nodes, len(route) + visits)
     for whole, part in ((tree.x, x), (tree.parent, parent), (tree.tip, tip)):
         whole[: len(x)] = part
     tree.depth[: len(x)] = depth
     tree.route[: len(route)] = route
-    for node in range(1, len(x)):
-        enlist(tree, node)
-    tree.size[:] = len(x), len(route)
+    tree.size[:] = len(x), len(route), home
+    enlist_all(tree)
     return tree
+
+
+def enlist_all(tree: Tree) -> None:
+    """Finds anew which nodes of the entry are looked up where."""
+    tree.last[:] = -1
+    for node in range(tree.size[2], tree.size[0]):
+        enlist(tree, node)
 
 
 def copied(tree: Tree, nodes: int, visits: int) -> Tree:
     """A tree of its own, with room for so many more nodes and visits."""
-    n, m = tree.size
+    n, m, home = map(int, tree.size)
     parts = tree.x[:n], tree.parent[:n], tree.depth[:n], tree.tip[:n]
-    return tree_of(*parts, tree.route[:m], nodes, visits)
+    return tree_of(*parts, tree.route[:m], home, nodes, visits)
 
 
 def grown(tree: Tree, nodes: int, visits: int) -> Tree:
@@ -103,7 +117,7 @@ def grown(tree: Tree, nodes: int, visits: int) -> Tree:
         wider[:used] = a[:used]
         return wider
 
-    n, m = tree.size
+    n, m, _ = tree.size
     return Tree(
         more(tree.x, n, nodes),
         more(tree.parent, n, nodes),
@@ -274,7 +288,7 @@ def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
     for n in range(count):
         found[n] = -1
         far[n] = math.inf
-    for node in range(t.size[0]):
+    for node in range(t.size[2], t.size[0]):
         _rank(t, p, node, found, far)
 
 

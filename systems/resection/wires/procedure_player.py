@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
+from plants.tissue.tissue_carver import Entry
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check, parameter
@@ -237,6 +238,7 @@ class ProcedurePlayer(Block):
     Port ``target`` emits the `ToolTarget`, ``lead`` ahead of time.
     Port ``reference`` emits the `ToolPose` of this instant.
     Port ``progress`` emits the `Progress`.
+    Port ``entry`` emits the `Entry` of the posture last reached.
     """
 
     def __init__(
@@ -246,6 +248,7 @@ class ProcedurePlayer(Block):
         postures: ArrayLike | None = None,
         first: int = 0,
         waits: NDArray[np.float64] | None = None,
+        entries: ArrayLike | None = None,
     ) -> None:
         """Makes the block for a plan.
 
@@ -256,6 +259,8 @@ class ProcedurePlayer(Block):
             first: Index of the posture at which the robot stands: those before it
                 have been played.
             waits: Time to be spent at each in s, (n,); none if None.
+            entries: The channel through which each is reached, (n,); the first if
+                None.
         """
         super().__init__()
         self._params = check(params or ProcedurePlayerParams())
@@ -271,12 +276,15 @@ class ProcedurePlayer(Block):
             raise ValueError(f"first={first}: expected 0 to {len(self._x) - 1}")
         self._first, self._x = first, self._x[first:]
         waits = None if waits is None else waits[first:]
+        entries = np.zeros(first + len(self._x)) if entries is None else entries
+        self._entries = np.asarray(entries, float)
         self._profile = profile(self._x, self._params, waits)
         self._times = self._profile.times
         ticket = {self.time_ticket()}
         self.signal_out("target", ToolTarget, self._calc_target, ticket)
         self.signal_out("reference", ToolPose, self._calc_reference, ticket)
         self.signal_out("progress", Progress, self._calc_progress, ticket)
+        self.signal_out("entry", Entry, self._calc_entry, ticket)
 
     @property
     def duration(self) -> float:
@@ -303,3 +311,7 @@ class ProcedurePlayer(Block):
     def _calc_progress(self, context: Any) -> list[float]:
         reached = int(np.searchsorted(self._times, context.get_time() + 1e-9, "right"))
         return [float(self._first + max(reached - 1, 0))]
+
+    def _calc_entry(self, context: Any) -> list[float]:
+        (posture,) = self._calc_progress(context)
+        return [float(self._entries[int(posture)])]
