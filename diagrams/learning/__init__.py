@@ -1,6 +1,6 @@
 """Environments for those who learn policies, the extra `learning`.
 
-`gymnasium.make("diagrams.learning:trocar/CrowdCrossing-v0")` imports and registers them.
+`gymnasium.make("diagrams.learning:trocar/CrowdCrossing-v0")` registers them.
 """
 
 from gymnasium.envs.registration import register
