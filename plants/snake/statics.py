@@ -503,7 +503,9 @@ class Statics:
         now, to, least, count, done = settled(turns, *args, self.record[0], MOST)
         return Equilibrium(now, to.L, to.T, least, count, done)
 
-    def _arguments(self, tension: Any, wound: Any, force: Any, moment: Any) -> Any:
+    def _arguments(
+        self, tension: Any, wound: Any, force: Any, moment: Any
+    ) -> tuple[Any, float, Any, Any]:
         load = np.array([*force, *moment], float)
         stiffness = 0.0 if wound is None else self.drive.wire_stiffness
         wound = np.zeros(ROPES) if wound is None else np.asarray(wound, float)
