@@ -41,6 +41,7 @@ DIAGRAMS: dict[str, list[str]] = {
     "nav_one_static": [],
     "nav_crowd": [],
     "snake_wire_break": [],
+    "snake_unstable": [],
     "resect_paper": ["spacing=0.001", "reach_effort=0.05"],
     "keyhole_circle": [],
 }
@@ -193,12 +194,26 @@ COMMANDS = {
     "WireDrums": {"rates": RATE, "lengths": HELD},
     "WireForwardActuation": {"desired_state": (slice(7, 14), slice(0, 7))},
     "WireInverseActuation": {"drums": HELD},
+    "WireStatics": {"desired_state": (slice(19, 38), slice(0, 19))},
 }
 """Outputs that command a motion, by block: which of their elements are rates, that must
 come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
-    *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
-    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "ToolWrench"),
+    *(
+        "BallLocation",
+        "FulcrumEstimator",
+        "OperationPhases",
+        "OpticalTracker",
+        "OrganEstimator",
+    ),
+    *(
+        "Perception",
+        "RobotLocation",
+        "SnakeLoad",
+        "SnakeLocation",
+        "ToolLoad",
+        "ToolWrench",
+    ),
     *("TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
 }
 """Blocks that command nothing."""
