@@ -2,10 +2,11 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import difflib
 from pathlib import Path
 
+from plants.faults.faulty_wire import Fault
 from systems.common.parameter import parameter
 
 SCENARIO_FOLDERS = Path(__file__).parents[1]
@@ -38,6 +39,7 @@ class Scenario:
     description: str = parameter("", "one line for `trocar scenarios`")
     duration: float = parameter(10.0, "simulated time", "s", above=0.0, most=1e5)
     seed: int = parameter(0, "of all randomness of the run", least=0, most=2**63 - 1)
+    faults: list[Fault] = field(default_factory=list)
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:

@@ -101,7 +101,7 @@ def test_twist_keeps_the_roll():
     du = np.cross([0.3, 0.1, 0.2], u)
     tip = (0.0, 0.0, -0.1)
     tool = ToolMotion(tip, vector(u), (0.01, 0.0, 0.0), vector(du), 1.0)
-    w, v = joint_commands.tool_twist(tip, vector(u), tool, 1.0, PERIOD, 0.3)
+    w, v = joint_commands.tool_twist(tip, vector(u), tool, 1.0, PERIOD, 0.3, 0.1)
     twist = np.array([*w, *v])
     assert twist[:3] @ u == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(np.cross(twist[:3], u), du, atol=1e-12)
