@@ -26,7 +26,7 @@ from systems.common.geometry import (
     all_finite,
     along,
     cross,
-    limited,
+    norm,
     plus,
     scaled,
     sub,
@@ -98,6 +98,7 @@ class JointCommandsParams:
 _BOUNDS = np.hstack([np.eye(7), -np.eye(7)])
 _STILL = (0.0, 0.0, 0.0)
 _FREE = flat(FREE)
+_YIELD = 0.7
 _GIVE_WAY = (float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST))
 _LITTLE = 1e-6
 """Weight of the centering against the tool's motion: the arm's spare joint alone."""
@@ -204,9 +205,12 @@ def tool_twist(
     rate = gain / period
     p = along(tool.tip, ahead, tool.v)
     u = along(tool.u, ahead, tool.du)
-    v = plus(tool.v, limited(scaled(rate, sub(p, p_WT)), fastest))
-    turning = limited(scaled(rate, sub(u, u_WT)), 10.0 * fastest)
-    return cross(u, plus(tool.du, turning)), v
+    away, askew = sub(p, p_WT), sub(u, u_WT)
+    worst = rate * max(norm(away), 0.1 * norm(askew))
+    # Both by one share: so the shaft keeps to the fulcrum on the way.
+    share = 1.0 if worst <= fastest else fastest / worst
+    v = scaled(share, along(tool.v, rate, away))
+    return cross(u, scaled(share, along(tool.du, rate, askew))), v
 
 
 @compiled
@@ -327,8 +331,11 @@ def _free_step(
     if strayed > constants.follow:
         left = constants.limp_time
     if left > 0.0 or permission.code in _GIVE_WAY:
-        q_next, set_point, _ = command(constants, q_m, np.zeros(JOINTS), weight, 0.0)
-        return q_next, set_point, Status(LIMP), left, 1.0
+        _, set_point, _ = command(constants, q_m, np.zeros(JOINTS), weight, 0.0)
+        # Most of the servos' own damping is taken away as well.
+        lag = constants.lead - constants.period
+        set_point[:JOINTS] += _YIELD * lag * np.array(measured.v)
+        return q_m, set_point, Status(LIMP), left, 1.0
     v = free_velocity(J, V, v_nominal)
     shortfall = missing(constants, J, v, V)
     is_free = 1.0
