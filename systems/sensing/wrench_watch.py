@@ -54,13 +54,16 @@ class WrenchWatchParams:
         1.5, "force from which its answer to motion counts", "N", above=0, most=20
     )
     answer_time: float = parameter(
-        0.05, "time constant of the answer's sums", "s", above=0, most=2
+        0.15, "time constant of the answer's sums", "s", above=0, most=2
     )
     answer_travel: float = parameter(
-        1.5e-3, "root of the summed squares of motion", "m", above=0, most=0.05
+        3e-4, "root of the summed squares of motion", "m", above=0, most=0.05
+    )
+    step: float = parameter(
+        2.0, "of a sample, from which it is the wall's own", "N", above=0, most=50
     )
     softest: float = parameter(
-        100.0, "wall, K, that a wrong answer must show", "N/m", above=0, most=2e4
+        50.0, "wall, K, that a wrong answer must show", "N/m", above=0, most=2e4
     )
     period: float = parameter(1 / 120, "of the readings", "s", above=0, most=0.1)
 
@@ -104,8 +107,9 @@ def watch(
     noise = old.noise
     if c.power > 0.0:
         noise += c.fresh * (dot(df, df) / c.power - noise)
-    answer = c.keep * old.answer + dot(df, ds)
-    travel = c.keep * old.travel + dot(ds, ds)
+    keep = c.keep if norm(df) < c.step else 0.0
+    answer = keep * (old.answer + dot(df, ds))
+    travel = keep * (old.travel + dot(ds, ds))
     sure = 5.0 * sqrt(c.power * travel)  # what noise alone makes of it
     wrong = answer > max(c.softest * travel, sure) and norm(f) > c.answer_force
     liar = 1.0 if wrong and travel > c.answer_travel**2 else old.liar
