@@ -98,7 +98,7 @@ class FaultyWire(Block):
             self._whole = self.signal_in("whole", signal)
             self.signals["told"] = signal
         # What was told at the last sample, and whether the fault is on.
-        self.DeclareDiscreteState(size + 1)
+        self.DeclareDiscreteState(np.append(np.zeros(size), self._is_on(0.0)))
         reads = {self._whole.ticket(), self.xd_ticket()}
         self.vector_out("told", size, self._calc_told, reads)
         self.update_every(period, self._update)
@@ -110,8 +110,11 @@ class FaultyWire(Block):
             self._breaks(whole, state[:-1], self._fault.size, self._period)
         return whole
 
+    def _is_on(self, time: float) -> float:
+        """1 if a sample at a time is told wrongly, else 0."""
+        since = time + 0.5 * self._period - self._fault.start
+        return float(0.0 < since <= self._fault.duration)
+
     def _update(self, context: Any) -> np.ndarray:
-        # The fault is on from the sample at its start: this state is the next one's.
-        since = context.get_time() + 1.5 * self._period - self._fault.start
-        is_on = 0.0 < since <= self._fault.duration + self._period
-        return np.append(self._calc_told(context), float(is_on))
+        is_on = self._is_on(context.get_time() + self._period)
+        return np.append(self._calc_told(context), is_on)

@@ -52,7 +52,7 @@ class Status(NamedTuple):
 LIMP = 2.0
 """Status of an arm that gives way: its servos are told where it is."""
 read_tool, read_point = reader(ToolMotion), reader(Point)
-finite_motion = finiteness(ToolMotion)
+finite_motion, finite_state = finiteness(ToolMotion), finiteness(ArmState)
 
 
 @dataclass
@@ -74,7 +74,7 @@ class JointCommandsParams:
     )
     # Where not all can be had: a tip that lags costs time, a fulcrum missed force.
     fulcrum_first: float = parameter(
-        30.0, "weight of the fulcrum's motion against the turning", least=1, most=1e3
+        5.0, "weight of the fulcrum's motion against the turning", least=1, most=1e3
     )
     shortfall: float = parameter(
         0.005, "error of the tool's velocity that is told", "m/s", least=0, most=0.05
@@ -325,7 +325,9 @@ def _free_step(
         weight = tool_state(arm, q)[3]
         return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (0.0, 1.0)
     J, V, v_nominal, low, high, weight = problem(constants, arm, q, time, tool, fulcrum)
-    q_m = np.array(measured.q)
+    q_m, v_m = np.array(measured.q), np.array(measured.v)
+    if not finite_state(measured):  # unseen it is where it was told to be
+        q_m, v_m = q, np.zeros(JOINTS)
     strayed = np.abs(product(J[3:], q - q_m)).max() / constants.fulcrum_first
     left = max(rest[0] - constants.period, 0.0)
     if strayed > constants.follow:
@@ -334,7 +336,7 @@ def _free_step(
         _, set_point, _ = command(constants, q_m, np.zeros(JOINTS), weight, 0.0)
         # Most of the servos' own damping is taken away as well.
         lag = constants.lead - constants.period
-        set_point[:JOINTS] += _YIELD * lag * np.array(measured.v)
+        set_point[:JOINTS] += _YIELD * lag * v_m
         return q_m, set_point, Status(LIMP), left, 1.0
     v = free_velocity(J, V, v_nominal)
     shortfall = missing(constants, J, v, V)

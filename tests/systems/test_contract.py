@@ -37,7 +37,7 @@ BLOCKS = all_blocks(systems)
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
-    "pwe_arc": [],
+    "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
     "snake_wire_break": [],
@@ -196,6 +196,7 @@ come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
     *("FulcrumEstimator", "OpticalTracker", "Perception", "RobotLocation"),
     *("SnakeLocation", "ToolWrench", "TrajectoryEstimator", "WireTension", "WireWatch"),
+    "WrenchWatch",
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}

@@ -104,7 +104,7 @@ class PlannerParams:
         20_000_000,
         "single steps that the finisher tries at most",
         least=1,
-        most=10_000_000_000,
+        most=1_000_000_000,
     )
     seed: int = parameter(1, "of all random choices", least=0, most=2**63 - 1)
 
@@ -172,7 +172,8 @@ class Planner:
                 self.progress(self.share)
         if self.session.steps and self.session.steps[-1].kind != "home":
             self.session.go_home()
-        self.session.concluded = repr(self.params)
+        if self.tried < self.params.budget:  # else there may be more to do
+            self.session.concluded = repr(self.params)
         self.session.save_if_filed()
 
     def unfinished(self) -> bool:
