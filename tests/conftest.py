@@ -8,7 +8,7 @@ import subprocess
 from hypothesis import settings
 import pytest
 
-settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 DIAGRAMS = Path(__file__).parent / "diagrams"

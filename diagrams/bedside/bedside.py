@@ -1,5 +1,6 @@
 """The robot at the bedside: arm, instrument and abdomen in one continuous plant."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +12,13 @@ from plants.abdomen.scenery import add_scenery
 from plants.abdomen.wall_force import add_wall_force
 from plants.abdomen.wall_motion import WallMotionParams, add_wall_motion
 from plants.arm.arm import add_arm
+from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import BASE_POSITION
 from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
+from plants.instruments.tube import TubeParams, add_tube
 from systems.common.parameter import parameter
 
 
@@ -36,6 +39,10 @@ class ToolAtStart:
     )
 
 
+THIN = (add_instrument, 0.0042)
+"""What adds an instrument, and the radius of its trocar in m."""
+
+
 @dataclass
 class Bedside:
     """What `add_bedside` added.
@@ -45,15 +52,21 @@ class Bedside:
         posture: Joint positions at the start (7) [rad].
         instrument: The robot's instrument.
         abdomen: The abdomen.
+        below: Model instances of all that hangs on the wrist's sensor.
     """
 
     systems: dict[str, Any]
     posture: np.ndarray
     instrument: Instrument
     abdomen: Abdomen
+    below: list[Any]
 
 
-def add_bedside(builder: Any, scenario: Any) -> Bedside:
+def add_bedside(
+    builder: Any,
+    scenario: Any,
+    hang: Callable[[Any, Any], list[Any]] = lambda plant, instrument: [],
+) -> Bedside:
     """Adds arm, instrument and abdomen to a diagram.
 
     The plant starts at rest, the shaft through the true fulcrum and unloaded.
@@ -62,6 +75,8 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
         builder: The diagram's builder.
         scenario: Has `robot`, `arm`, `instrument`, `abdomen`, `wall_motion` and
             `duration`.
+        hang: Adds what else hangs on the instrument to the plant that is not yet
+            finalized, and returns its model instances.
 
     Raises:
         ValueError: If the start cannot be reached.
@@ -69,19 +84,31 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
     motion: WallMotionParams = scenario.wall_motion
     plant, scene_graph = add_plant_and_scene(builder)
     arm = add_arm(plant, params=scenario.arm)
-    instrument = add_instrument(
-        plant, plant.GetFrameByName("flange", arm), scenario.instrument
-    )
+    hung = scenario.instrument
+    add, bore = (add_tube, 0.0062) if isinstance(hung, TubeParams) else THIN
+    instrument = add(plant, plant.GetFrameByName("flange", arm), hung)
     abdomen = add_abdomen(
-        plant, instrument.body.body_frame(), scenario.robot.p_WG, scenario.abdomen
+        plant,
+        instrument.body.body_frame(),
+        scenario.robot.p_WG,
+        scenario.abdomen,
+        bore=bore,
     )
+    below = [instrument.instance, abdomen.sleeve_instance, *hang(plant, instrument)]
     add_scenery(plant, BASE_POSITION)
     plant.Finalize()
     connect_poses(builder, plant, scene_graph)
     moved = motion.displacement(0.0)
     p_WG = np.add(scenario.robot.p_WG, moved)
+    known = plant
+    if plant.num_constraints():  # couplers would be constraints to the solver as well
+        known = make_controller_plant(instrument=scenario.instrument)
     posture = home_posture(
-        plant, arm, instrument.tip, p_WG.tolist(), scenario.robot.p_WP
+        known,
+        known.GetJointByName("joint1").model_instance(),
+        known.GetFrameByName(INSTRUMENT_TIP),
+        p_WG.tolist(),
+        scenario.robot.p_WP,
     )
     plant.SetDefaultPositions(arm, posture)
     plant.SetDefaultPositions(abdomen.wall_instance, moved)
@@ -95,7 +122,7 @@ def add_bedside(builder: Any, scenario: Any) -> Bedside:
         "scene_graph": scene_graph,
         "wall_force": add_wall_force(builder, plant, abdomen, motion.stiffness_factor),
     }
-    return Bedside(systems, posture, instrument, abdomen)
+    return Bedside(systems, posture, instrument, abdomen, below)
 
 
 def stiffen(case: Any, station: Any, context: Any) -> None:

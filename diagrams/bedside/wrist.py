@@ -1,7 +1,6 @@
 """Figure 2's "passive wrist emulation control", for every diagram that has an arm."""
 
 from dataclasses import dataclass, replace
-import logging
 from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
@@ -94,16 +93,6 @@ def check_wrist(scenario: Any) -> None:
             )
 
 
-def _not_of_joint_limits(record: logging.LogRecord) -> bool:
-    """Whether a log record is not Drake's warning of joint limits.
-
-    A reaction force is asked of the continuous plant's forward dynamics, which
-    knows no joint limits and says so once. CENIC, which moves the arm, knows them,
-    and the joints' commands keep away from them.
-    """
-    return "does not handle joint limits" not in record.getMessage()
-
-
 def add_wrist(
     builder: DiagramBuilder, bedside: Bedside, scenario: Any
 ) -> dict[str, Any]:
@@ -120,7 +109,6 @@ def add_wrist(
     Raises:
         ValueError: If a parameter makes no sense or the sensor's frame is not there.
     """
-    logging.getLogger("drake").addFilter(_not_of_joint_limits)
     guess = [
         p + e for p, e in zip(scenario.robot.p_WG, scenario.first_guess, strict=True)
     ]
@@ -139,6 +127,8 @@ def add_wrist(
             sensor,
             scenario.instrument,
             bedside.abdomen,
+            bedside.below,
+            scenario.wall_motion.stiffness_factor,
         ),
         "wrench_watch": WrenchWatch(scenario.wrench_watch, guess),
         "fulcrum_estimator": FulcrumEstimator(estimator),

@@ -29,9 +29,10 @@ def draw_point(
 
 def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
     """True fulcrum (green), believed one (violet), the wall's force (orange)."""
-    time = run.signals["time"]
-    true = run.wall.fulcrum.p
-    believed = run.wrist.pivot.p
+    every = max(1, round(run.replay_speed))
+    time = run.signals["time"][::every] / run.replay_speed
+    true = run.wall.fulcrum.p[::every]
+    believed = run.wrist.pivot.p[::every]
     for path, points, radius, rgba in (
         ("true_fulcrum", true, 0.013, (0.16, 0.7, 0.3, 0.4)),
         ("believed_fulcrum", believed, 0.008, (0.6, 0.15, 0.8, 1.0)),
@@ -43,7 +44,7 @@ def decorate_wrist(meshcat: Any, animation: Any, run: Any) -> None:
         "wall_force",
         time,
         true,
-        run.wall.force.f * METRES_PER_NEWTON,
+        run.wall.force.f[::every] * METRES_PER_NEWTON,
         (0.95, 0.6, 0.1, 1.0),
         step=4,
     )

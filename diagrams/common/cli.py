@@ -19,6 +19,7 @@ examples:
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
+  trocar campaign operations --runs 200     many runs, and how sure that is
 """
 
 
@@ -80,6 +81,29 @@ def make_parser() -> argparse.ArgumentParser:
     )
     resect.add_argument(
         "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
+    campaign = commands.add_parser(
+        "campaign",
+        help="run a scenario many times, varied, and say how sure the answer is",
+        description="Runs a campaign; started again with the same DIR it goes on. "
+        "Writes runs/ (Parquet), report.html, summary.json and the worst runs as "
+        "scenarios. Needs the extra `campaigns`.",
+    )
+    campaign.add_argument("name", metavar="NAME", help="a campaign's name or its file")
+    campaign.add_argument("--runs", type=int, metavar="N", help="of each variant")
+    campaign.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one a core"
+    )
+    campaign.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
+    )
+    campaign.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
+    campaign.add_argument("--seed", type=int, metavar="N", help="of the draws")
+    campaign.add_argument(
+        "--planner",
+        metavar="MODULE:CLASS",
+        default="",
+        help="a planner of one's own as a further variant of `crossing`",
     )
     return parser
 
@@ -161,12 +185,25 @@ def resect_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def campaign_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar campaign`."""
+    try:
+        from diagrams.campaigns import command
+    except ModuleNotFoundError as error:
+        raise ScenarioError(
+            f"no module {error.name!r}: campaigns need the extra, "
+            "pip install 'trocar[campaigns]'"
+        ) from error
+    return command.campaign_command(arguments)
+
+
 COMMANDS = {
     "scenarios": list_scenarios,
     "run": run_command,
     "diagram": diagram_command,
     "keys": keys_command,
     "resect": resect_command,
+    "campaign": campaign_command,
 }
 
 

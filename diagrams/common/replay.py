@@ -24,6 +24,9 @@ QUERY_PORT = "scene_graph.query"
 """The exported port of a study's diagram that Meshcat draws."""
 
 
+FAR = "far"
+"""Path of what a close-up does not show."""
+
 MOST_FRAMES = 4000
 """Of a replay: a longer one has fewer a second. A frame has about 2.3 kB."""
 

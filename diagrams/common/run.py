@@ -313,6 +313,12 @@ def run_scenario(
             if meshcat is not None:
                 with into.file("replay.html") as draft:
                     draft.write_text(meshcat.StaticHtml())
+                near = run.study.close_up
+                if near is not None:
+                    meshcat.SetCameraPose(near.camera, near.target)
+                    meshcat.SetProperty(f"/{replay.FAR}", "visible", False)
+                    with into.file("close_up.html") as draft:
+                        draft.write_text(meshcat.StaticHtml())
     return run
 
 

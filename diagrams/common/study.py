@@ -55,6 +55,7 @@ class Study:
         required: Dotted keys that a scenario's file must have.
         integrator: Makes the SimulatorConfig of a scenario.
         view: The replay's camera.
+        close_up: That of a second replay, `close_up.html`; none if None.
         adjust: Called with case, diagram and root context before every frame,
             for parameters of the plant that change with time.
         keep: Called with case, diagram, root context and whether the run has
@@ -84,6 +85,7 @@ class Study:
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], SimulatorConfig] = lambda scenario: cenic()
     view: View = field(default_factory=View)
+    close_up: View | None = None
     frame_rate: float = 30.0
     length: Callable[[Any], float] = lambda case: case.scenario.duration
     replay_length: float = math.inf

@@ -31,10 +31,20 @@ def shown_spacing(volume: Any) -> int:
     return max(1, round(max(0.8e-3, longest / 60) / volume.spacing))
 
 
-def decorate(meshcat: Any, animation: Any, run: Any) -> None:
-    """The tumour in blocks whose visibility is animated, the vessel, Figure 7."""
+def draw_tissue(
+    meshcat: Any, animation: Any, run: Any, first: int = 0, path: str = ""
+) -> None:
+    """The tumour in blocks whose visibility is animated, and the vessel.
+
+    Args:
+        meshcat: The Meshcat that records.
+        animation: Its recording.
+        run: Has carved.
+        first: Index of the move that it began after.
+        path: Of the frame that the tissue lies in, with a slash at its end.
+    """
     volume = run.case.session.volume
-    tau, first = carving_of(run).volume.tau, run.case.done.index
+    tau = carving_of(run).volume.tau
     moves = float(run.tissue.index.number[-1]) - first
     end = float(run.signals["time"][-1]) / run.replay_speed
     every = shown_spacing(volume)
@@ -54,20 +64,27 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
                 continue
             if key in shown and shown[key][1]:
                 animation.SetProperty(frame, shown[key][1], "visible", False)
-            path = ""
+            name = ""
             if piece:
-                name = "_".join(map(str, key)).replace("-", "m")
-                path = f"tissue/{name}/{number}"
-                meshcat.SetTriangleMesh(path, piece[0].T, piece[1].T, TISSUE)
+                block = "_".join(map(str, key)).replace("-", "m")
+                name = f"{path}tissue/{block}/{number}"
+                meshcat.SetTriangleMesh(name, piece[0].T, piece[1].T, TISSUE)
                 if number > 0:
-                    animation.SetProperty(0, path, "visible", False)
-                animation.SetProperty(frame, path, "visible", True)
-            shown[key] = (mark, path)
+                    animation.SetProperty(0, name, "visible", False)
+                animation.SetProperty(frame, name, "visible", True)
+            shown[key] = (mark, name)
     if (volume.labels == CRITICAL).any():
         vertices, faces = surface(
             coarse(volume.labels == CRITICAL, 1), volume.origin, volume.spacing
         )
-        meshcat.SetTriangleMesh("vessel", vertices.T, faces.T, VESSEL)
+        meshcat.SetTriangleMesh(f"{path}vessel", vertices.T, faces.T, VESSEL)
+
+
+def decorate(meshcat: Any, animation: Any, run: Any) -> None:
+    """The tumour that shrinks, the vessel, Figure 7."""
+    volume = run.case.session.volume
+    tissue = np.isin(volume.labels, (TUMOUR, CAP))
+    draw_tissue(meshcat, animation, run, run.case.done.index)
     _elementary_volumes(meshcat, animation, run)
     # The study's view shows 6 cm; a smaller tumour is looked at from nearer.
     view = run.study.view

@@ -93,6 +93,7 @@ def add_abdomen(
     p_PG: Sequence[float] = (0.0, 0.0, 0.0),
     params: AbdomenParams | None = None,
     parent: Any = None,
+    bore: float = 0.0042,
 ) -> Abdomen:
     """Adds the wall, and a trocar that holds a shaft.
 
@@ -105,6 +106,7 @@ def add_abdomen(
         p_PG: The fulcrum G in the parent frame P (z out of the body), in m (3).
         params: Stiffness, friction, masses.
         parent: A frame of the plant; the world if None.
+        bore: Radius in m that the trocar is drawn with.
 
     Raises:
         ValueError: If a parameter cannot be or the fulcrum is not finite.
@@ -136,7 +138,7 @@ def add_abdomen(
         # A servo of zero speed whose torque saturates is dry friction.
         seal = plant.AddJointActuator("seal", joint, params.seal_friction)
         seal.set_controller_gains(PdControllerGains(p=0.0, d=_SEAL_VISCOSITY))
-    draw_trocar(plant, sleeve)
+    draw_trocar(plant, sleeve, bore)
 
     # Turned about x, so that the frames agree for a shaft straight down: the
     # bushing's angles stay far from their singularity at 90 degrees of pitch.
@@ -177,10 +179,10 @@ def seat_sleeve(plant: Any, context: Any, abdomen: Abdomen) -> None:
     abdomen.sleeve_joint.set_translation(context, distance)
 
 
-def draw_trocar(plant: Any, body: Any) -> None:
+def draw_trocar(plant: Any, body: Any, bore: float = 0.0042) -> None:
     """Draws a cannula and its head around a body's z axis, which points inwards."""
     for name, radius, length, z, rgba in (
-        ("cannula", 0.0042, 0.056, 0.012, TROCAR),
+        ("cannula", bore, 0.056, 0.012, TROCAR),
         ("collar", 0.0085, 0.006, -0.010, TROCAR),
         ("head", 0.0115, 0.022, -0.024, TROCAR),
     ):

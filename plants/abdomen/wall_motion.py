@@ -15,8 +15,9 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from plants.abdomen.abdomen import Abdomen
+from plants.abdomen.breath import Irregular
 from plants.common.actuation import hold_still
-from systems.common.parameter import check, parameter
+from systems.common.parameter import check, parameter, part
 
 _INSPIRATION = 0.4  # share of a breath, I:E 1:1.5
 _EXPIRATION = 0.05  # time constant of the passive expiration, share of a breath
@@ -55,19 +56,36 @@ class WallMotionParams:
         0.0, "relative growth of the stiffness in the rise", least=-0.9, most=10
     )
 
+    cough: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "how far one throws it",
+        "m",
+        least=-0.03,
+        most=0.03,
+        shape=(3,),
+    )
+    irregular: Irregular = part(Irregular)
+
     @property
     def still(self) -> bool:
         """Whether the wall never moves."""
-        return not any((*self.breathing, *self.step, *self.rise))
+        coughs = self.cough if self.irregular.coughs else []
+        return not any((*self.breathing, *self.step, *self.rise, *coughs))
 
     def displacement(self, time: float) -> list[float]:
         """Where the wall is told to be, from its rest, in m (3)."""
-        g = wave(self.wave, self.rate * time + self.phase)
+        phase, depth = self.irregular.breath(time, self.rate)
+        g = wave(self.wave, phase + self.phase)
+        if self.irregular.disturbed:  # a deeper breath ends where all do
+            g = depth * (g + 1.0) - 1.0
+        thrown = self.irregular.coughing(time)
         jump = 1.0 if any(self.step) and time >= self.step_time else 0.0
         r = self.risen(time)
         return [
-            b * g + s * jump + up * r
-            for b, s, up in zip(self.breathing, self.step, self.rise, strict=True)
+            b * g + s * jump + up * r + thrown * c
+            for b, s, up, c in zip(
+                self.breathing, self.step, self.rise, self.cough, strict=True
+            )
         ]
 
     def risen(self, time: float) -> float:

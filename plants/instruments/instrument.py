@@ -6,6 +6,7 @@ expressed in it. Straight tools of 3 to 10 mm diameter and 200 to 450 mm length 
 usual; shaft bending is left out.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,8 +67,7 @@ class Instrument:
         body: The rigid body, whose frame is the mount frame M: origin at the
             sensor, z along the shaft towards the tip.
         tip: The frame `instrument_tip`, axes as M's, origin at the tip.
-        sensor: The weld joint; `int(sensor.index())` is its place in the plant's
-            `reaction_forces`.
+        sensor: The weld joint, which the wrist's sensor sits in.
         shaft_geometry: The shaft's proximity geometry, None without SceneGraph.
         length: From the sensor to the tip, in m.
         params: What it was made from.
@@ -83,7 +83,10 @@ class Instrument:
 
 
 def add_instrument(
-    plant: Any, frame: Any, params: InstrumentParams | None = None
+    plant: Any,
+    frame: Any,
+    params: InstrumentParams | None = None,
+    look: Callable[[Any, Any, Any], None] | None = None,
 ) -> Instrument:
     """Hangs the instrument on a frame of the plant through the wrist sensor.
 
@@ -96,6 +99,7 @@ def add_instrument(
         frame: What carries the sensor, for example the arm's `flange`; z along the
             instrument.
         params: Dimensions and masses.
+        look: Draws it, of plant, body and params; a gauze holder if None.
 
     Raises:
         ValueError: If a parameter cannot be.
@@ -115,7 +119,7 @@ def add_instrument(
             instance,
         )
     )
-    _draw(plant, body, params)
+    (look or _draw)(plant, body, params)
     geometry = None
     if plant.geometry_source_is_registered():
         length = params.length - params.mount_length

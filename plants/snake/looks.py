@@ -17,6 +17,7 @@ CHANNEL = [0.55, 0.70, 0.85, 0.18]
 
 SHANK_RADIUS = 0.8e-3
 CHANNEL_LENGTH = 0.03
+ROD = 0.2
 
 
 def _along(z: float) -> RigidTransform:
@@ -34,10 +35,14 @@ def draw_plate(plant: Any, body: Any, params: SnakeParams) -> None:
     draw(plant, body, disc, _along(params.half_pitch), "plate", PLATE)
 
 
-def draw_carriage(plant: Any, body: Any, params: SnakeParams) -> None:
-    """The base plate before O0, and the tube that carries it."""
+def draw_carriage(plant: Any, body: Any, params: SnakeParams, rod: bool) -> None:
+    """The base plate before O0, and the tube and slide, or the rod, that carry it."""
     h, e, r = params.half_pitch, params.plate_thickness, params.body_radius
     draw(plant, body, Cylinder(r, e), _along(-h), "base_plate", PLATE)
+    if rod:
+        X = _along(-h - 0.5 * (e + ROD))
+        draw(plant, body, Cylinder(0.75 * r, ROD), X, "rod", DARK)
+        return
     tube = 0.06
     draw(plant, body, Cylinder(r, tube), _along(-h - 0.5 * (e + tube)), "tube", STEEL)
     foot = -h - e - tube

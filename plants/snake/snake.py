@@ -159,7 +159,8 @@ class _Chain:
             PrismaticJoint("s", frame, carriage.body_frame(), [0.0, 0.0, 1.0])
         )
         self._servo(joint, self.drive.travel_kp, self.drive.travel_kd)
-        draw_carriage(self.plant, carriage, self.params)
+        hosted = frame.body().index() != self.plant.world_body().index()
+        draw_carriage(self.plant, carriage, self.params, hosted)
         self.body, self.end = carriage, carriage.body_frame()
 
     def add_module(self, k: int) -> None:

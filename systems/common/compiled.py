@@ -48,6 +48,11 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     return result
 
 
+def inlined(function: Any) -> Any:
+    """A compiled function for one caller: compiled as a part of it, not by itself."""
+    return numba.njit(inline="always", error_model="numpy")(function.py_func)
+
+
 def generated(source: str, name: str, home: Any, names: dict[str, Any]) -> Any:
     """Compiles a function from its source text.
 

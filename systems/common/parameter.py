@@ -10,7 +10,7 @@ method `rules` that yields what must hold, the field to blame, and what is expec
 it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 import difflib
 import math
@@ -95,8 +95,8 @@ def parameter(default: Any, meaning: str, unit: str = "", **limits: Any) -> Any:
     return field(default=default, metadata=metadata)
 
 
-def part(kind: type) -> Any:
-    """A field of a dataclass that holds parameters of another."""
+def part(kind: Callable[[], Any]) -> Any:
+    """A field of a dataclass that holds parameters of another, or what makes them."""
     return field(default_factory=kind)
 
 

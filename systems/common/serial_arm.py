@@ -27,7 +27,7 @@ def read_arm(plant: Any, tip: Any) -> np.ndarray:
     Returns:
         A record for the functions of this module, at q = 0: `axes` and `origins` of
         the joints (n x 3), `tip` and `shaft` (3), `centre` of the load's mass (3) and
-        the load's `weight` in N (3).
+        the load's `weight` in N (3), and the tip frame's axis `across` (3), its x.
     """
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, np.zeros(plant.num_positions()))
@@ -48,6 +48,7 @@ def read_arm(plant: Any, tip: Any) -> np.ndarray:
         origins=np.array(origins),
         tip=X_WT.translation(),
         shaft=X_WT.rotation().col(2),
+        across=X_WT.rotation().col(0),
         centre=plant.CalcCenterOfMassPositionInWorld(context, loads),
         weight=mass * plant.gravity_field().gravity_vector(),
     )
@@ -97,6 +98,19 @@ def walk(
     tip = placed(frame, xyz(arm.tip, 0))
     shaft = sub(placed(frame, xyz(arm.shaft, 0)), frame[0])
     return tip, shaft, placed(frame, xyz(arm.centre, 0))
+
+
+@compiled
+def tip_frame(arm: Any, q: Numbers) -> tuple[Vector, Vector, Vector]:
+    """p_WT of the tip at a posture (n) [rad], and the axes x and z of its frame T."""
+    tip, x, z = xyz(arm.tip, 0), xyz(arm.across, 0), xyz(arm.shaft, 0)
+    for k in range(len(arm.axes)):  # the last joint turns first, about its axis at 0
+        i = len(arm.axes) - 1 - k
+        a, o = xyz(arm.axes[i], 0), xyz(arm.origins[i], 0)
+        c, s = cos(q[i]), sin(q[i])
+        tip = along(o, 1.0, turned(sub(tip, o), a, c, s))
+        x, z = turned(x, a, c, s), turned(z, a, c, s)
+    return tip, x, z
 
 
 @compiled

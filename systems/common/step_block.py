@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from systems.common.block import Block
-from systems.common.compiled import generated
+from systems.common.compiled import generated, inlined
 from systems.common.signal import Many, elements, flat, reading, size
 
 type Step = Callable[..., np.ndarray]
@@ -95,7 +95,7 @@ def _wired(
     source = f"def {name}({', '.join([*records, *arrays])}):\n{body}"
     signals = [kind for kind in kinds if not isinstance(kind, int | Many)]
     known = {signal.__name__: signal for signal in signals}
-    return generated(source, name, step, {**known, "step": step, "np": np})
+    return generated(source, name, step, {**known, "step": inlined(step), "np": np})
 
 
 class StepBlock(Block):

@@ -10,10 +10,10 @@ axis u the wall's lateral wrench about M is
 
 (F, M) being what the arm does to the instrument, the sensor's reading. The trocar's
 sleeve rides on the shaft; its inertia is taken away as well. The accelerations are
-those of the plant's own model, as of an accelerometer that is built into the mount.
+those of accelerometers (`plants.instruments.wrist_sensor`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from typing import Any
@@ -21,21 +21,30 @@ from typing import Any
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialAcceleration, SpatialForce, SpatialVelocity
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from plants.abdomen.abdomen import Abdomen
 from plants.instruments.instrument import InstrumentParams
+from plants.instruments.wrist_sensor import Felt, add_wrist_sensor
 from systems.common.block import Block
 from systems.common.compiled import packed
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import example, flat, size
+from systems.common.signal import example, flat, size, view
 from systems.common.signals import ShaftMotion, Wrench
 from systems.common.step_block import wired
 from systems.sensing import sensor_noise
-from systems.sensing.wrench_kernel import SILENCE, Fault, shaft_motion, wall_wrench
+from systems.sensing.wrench_kernel import (
+    NO_LOAD,
+    SILENCE,
+    Fault,
+    Load,
+    shaft_motion,
+    wall_wrench,
+)
 
 _NOWHERE = np.zeros(3)
+_UNLOADED = flat(NO_LOAD)
 _SHAFT = size(ShaftMotion)
 _ROW = _SHAFT + size(Wrench)
 
@@ -108,8 +117,8 @@ def silent(lost: Sequence[float], time: float) -> bool:
     return any(a <= time < b for a, b in zip(lost[::2], lost[1::2], strict=True))
 
 
-def sensor_indices(plant: Any, frame: str) -> tuple[int, int]:
-    """Places of the sensor in `reaction_forces` and of its body in `body_poses`.
+def sensed_body(plant: Any, frame: str) -> Any:
+    """The body below the sensor.
 
     Args:
         plant: A finalized MultibodyPlant.
@@ -134,7 +143,7 @@ def sensor_indices(plant: Any, frame: str) -> tuple[int, int]:
         if joint.child_body().index() == body.index():
             if joint.num_velocities():
                 break
-            return int(joint.index()), int(body.index())
+            return body
     raise ValueError(
         f"tool_wrench.frame={frame!r} does not hang on a weld joint, "
         "whose reaction a wrist sensor could read"
@@ -147,13 +156,13 @@ class ToolWrench(Block):
     White noise, a drifting bias, taring before the shaft enters the trocar,
     saturation, silence and delay are parameters. All outputs are in W.
 
-    Port ``reaction_forces`` accepts the plant's port of that name.
+    Port ``felt`` accepts the reading, `Felt`.
 
     Port ``body_poses`` accepts the plant's port of that name.
 
     Port ``body_spatial_velocities`` accepts the plant's port of that name.
 
-    Port ``body_spatial_accelerations`` accepts the plant's port of that name.
+    Port ``load`` accepts the `Load` that slides along it; none without a wire.
 
     Port ``shaft`` emits the `ShaftMotion`.
 
@@ -164,7 +173,6 @@ class ToolWrench(Block):
         self,
         params: ToolWrenchParams | None = None,
         instrument: InstrumentParams | None = None,
-        joint: int = 0,
         body: int = 0,
         sleeve: int = -1,
         sleeve_mass: float = 0.0,
@@ -174,7 +182,6 @@ class ToolWrench(Block):
         Args:
             params: Noise, bias, range.
             instrument: What hangs below the sensor.
-            joint: Place of the sensor's joint in `reaction_forces`.
             body: Place of the instrument in `body_poses`.
             sleeve: Place of the trocar's sleeve in it; negative for none.
             sleeve_mass: In kg.
@@ -184,7 +191,7 @@ class ToolWrench(Block):
         check(p)
         instrument = instrument or InstrumentParams()
         share = 1.0 + p.mass_error
-        self._joint, self._body, self._sleeve = joint, body, sleeve
+        self._body, self._sleeve = body, sleeve
         self._constants = packed(
             mass=share * instrument.mass,
             centre=instrument.centre,
@@ -195,7 +202,7 @@ class ToolWrench(Block):
         )
         # Where a number stands, the kernels take one of Drake's arrays as it is.
         self._move = wired(shaft_motion, 0, [], [9, 3, 3, 3], [ShaftMotion], False)
-        reading = [9, ShaftMotion, 3, 3, 3, 3, 3, Fault, 3, 3]
+        reading = [9, ShaftMotion, 3, 3, 3, 3, 3, Fault, 3, 3, Load]
         self._read = wired(wall_wrench, 1, [], reading, [Wrench], False)
         self._silence = flat(SILENCE)
         step = math.sqrt(p.period)
@@ -206,25 +213,21 @@ class ToolWrench(Block):
             before = sensor_noise.mean_before_start(p.seed, p.tare_samples)
             zero = -np.array(noise) * before
         self._faults = (noise, drift, tuple(zero.tolist()))
-        self._forces = self.DeclareAbstractInputPort(
-            "reaction_forces", Value([SpatialForce.Zero()])
-        )
+        self._felt = self.signal_in("felt", Felt)
+        self._load = self.signal_in("load", Load)
         self._poses = self.DeclareAbstractInputPort(
             "body_poses", Value([RigidTransform()])
         )
         self._velocities = self.DeclareAbstractInputPort(
             "body_spatial_velocities", Value([SpatialVelocity.Zero()])
         )
-        self._accelerations = self.DeclareAbstractInputPort(
-            "body_spatial_accelerations", Value([SpatialAcceleration.Zero()])
-        )
         moving = {self._poses.ticket(), self._velocities.ticket()}
         self._motion = self.cached("motion", self._calc_motion, moving)
         late = {self.xd_ticket()}
         feeling = {
             self._motion.ticket(),
-            self._forces.ticket(),
-            self._accelerations.ticket(),
+            self._felt.ticket(),
+            self._load.ticket(),
             self.time_ticket(),
         }
         if p.delay:
@@ -263,25 +266,23 @@ class ToolWrench(Block):
         if p.lost and silent(p.lost, time):
             return self._silence
         shaft, w, R_WM = self._motion.Eval(context)
-        accelerations = self._accelerations.Eval(context)
-        A_WM = accelerations[self._body]
-        F = self._forces.Eval(context)[self._joint]
-        p_WC = a_WC = _NOWHERE
+        felt = view(Felt, self._felt.Eval(context))
+        p_WC = _NOWHERE
         if self._sleeve >= 0:
             p_WC = self._poses.Eval(context)[self._sleeve].translation()
-            a_WC = accelerations[self._sleeve].translational()
         return self._read(
             self._constants,
             R_WM,
             shaft,
             w,
-            A_WM.rotational(),
-            A_WM.translational(),
-            F.translational(),
-            F.rotational(),
+            felt.alpha,
+            felt.a,
+            felt.f,
+            felt.m,
             sensor_noise.fault(p.seed, max(0, round(time / p.period)), self._faults),
             p_WC,
-            a_WC,
+            felt.a_C,
+            self._load.Eval(context) if self._load.HasValue(context) else _UNLOADED,
         )
 
     def _push(self, context: Any) -> np.ndarray:
@@ -303,19 +304,30 @@ def add_tool_wrench(
     params: ToolWrenchParams,
     instrument: InstrumentParams,
     abdomen: Abdomen,
+    below: Sequence[ModelInstanceIndex],
+    factor: Callable[[float], float] = lambda time: 1.0,
 ) -> ToolWrench:
-    """Adds the block as `tool_wrench` and wires it to the plant's sensor."""
-    joint, body = sensor_indices(plant, params.frame)
-    sleeve = int(abdomen.sleeve.index())
-    mass = abdomen.params.sleeve_mass
-    block = builder.AddNamedSystem(
-        "tool_wrench", ToolWrench(params, instrument, joint, body, sleeve, mass)
+    """Adds the block as `tool_wrench`, with the sensor, and wires it to the plant.
+
+    Args:
+        builder: The diagram's builder.
+        plant: The finalized plant.
+        params: Noise, bias, range.
+        instrument: What is known to hang below the sensor.
+        abdomen: What `add_abdomen` returned.
+        below: Model instances of what really hangs there, the sleeve's too.
+        factor: The trocar's stiffness against the abdomen's, by time in s.
+    """
+    body = sensed_body(plant, params.frame)
+    sensor = add_wrist_sensor(
+        builder, plant, body, abdomen, below, params.period, factor
     )
-    for name in (
-        "reaction_forces",
-        "body_poses",
-        "body_spatial_velocities",
-        "body_spatial_accelerations",
-    ):
+    places = (int(body.index()), int(abdomen.sleeve.index()))
+    block = builder.AddNamedSystem(
+        "tool_wrench",
+        ToolWrench(params, instrument, *places, abdomen.params.sleeve_mass),
+    )
+    builder.Connect(sensor.GetOutputPort("felt"), block.GetInputPort("felt"))
+    for name in ("body_poses", "body_spatial_velocities"):
         builder.Connect(plant.GetOutputPort(name), block.GetInputPort(name))
     return block

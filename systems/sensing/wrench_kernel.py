@@ -1,12 +1,12 @@
 """The tool's wrench from the sensor's reading, compiled (see `tool_wrench`)."""
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import along, cross, plus, scaled, sub, xyz
-from systems.common.signal import Vector, finiteness
+from systems.common.signal import Field, Vector, finiteness
 from systems.common.signals import ShaftMotion, Wrench
 
 _GRAVITY = 9.81
@@ -20,6 +20,16 @@ class Fault(NamedTuple):
 
     f: Vector
     m: Vector
+
+
+class Load(NamedTuple):
+    """A mass that slides along the instrument: a snake in its tube."""
+
+    mass: Annotated[float, Field("kg", "of it", 0.0)]
+    at: Annotated[float, Field("m", "of its centre from the sensor", 0.35)]
+
+
+NO_LOAD = Load(0.0, 0.0)
 
 
 @compiled
@@ -52,6 +62,7 @@ def wall_wrench(
     fault: Fault,
     p_WC: Numbers,
     a_WC: Numbers,
+    load: Load,
 ) -> tuple[Wrench]:
     """What the wall does to the shaft, in W, about the sensor's origin.
 
@@ -69,6 +80,7 @@ def wall_wrench(
         fault: What is added to it.
         p_WC: Place of the sleeve.
         a_WC: Its acceleration.
+        load: What slides along the instrument.
 
     Returns:
         The wrench; silence while an axis is saturated.
@@ -78,11 +90,13 @@ def wall_wrench(
         in_range = abs(f_M[i]) <= params.force_range
         if not (in_range and abs(m_M[i]) <= params.moment_range):
             return (SILENCE,)  # a NaN is not in range either
-    mass, centre = params.mass, params.centre
+    mass = params.mass + load.mass
+    centre = (params.mass * params.centre + load.mass * load.at) / mass
+    transverse = params.inertia + load.mass * load.at * load.at
     ddu = plus(cross(alpha, shaft.u), cross(w, shaft.du))
     felt = plus(a, (0.0, 0.0, _GRAVITY))  # a - g
     f = scaled(mass, along(felt, centre, ddu))
-    m = cross(shaft.u, along(scaled(params.inertia, ddu), mass * centre, felt))
+    m = cross(shaft.u, along(scaled(transverse, ddu), mass * centre, felt))
     if params.sleeve_mass > 0.0:
         inertia = scaled(params.sleeve_mass, a_WC)
         f = plus(f, inertia)

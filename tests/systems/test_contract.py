@@ -42,6 +42,7 @@ DIAGRAMS: dict[str, list[str]] = {
     "nav_crowd": [],
     "snake_wire_break": [],
     "resect_paper": ["spacing=0.001", "reach_effort=0.05"],
+    "keyhole_circle": [],
 }
 """Scenarios with overrides: every kind of diagram, and every observer in one."""
 # What observes a plant has no ports' values without it: tested in its diagram.
@@ -181,10 +182,12 @@ COMMANDS = {
     "JointCommands": {"posture": HELD, "set_point": HELD},
     "PassiveWristEmulation": {"tool": TOOL},
     "ResectionIk": {"posture": HELD},
+    "SnakeTask": {"target": HELD},
     "StatechartPlanner": {"v_R": RATE},
     "SwitchingPlanner": {"v_R": RATE},
     "ToolBypass": {"v1": RATE},
     "ToolNavigation": {"tool": TOOL},
+    "TubeTask": {"tool": TOOL},
     "UnicycleControl": {"command": RATE},
     "VelocityCorrections": {"v2": RATE},
     "WireDrums": {"rates": RATE, "lengths": HELD},
@@ -194,8 +197,9 @@ COMMANDS = {
 """Outputs that command a motion, by block: which of their elements are rates, that must
 come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
-    *("FulcrumEstimator", "OpticalTracker", "Perception", "RobotLocation"),
-    *("SnakeLocation", "ToolWrench", "TrajectoryEstimator", "WireTension", "WireWatch"),
+    *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
+    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "ToolWrench"),
+    *("TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     "WrenchWatch",
 }
 """Blocks that command nothing."""

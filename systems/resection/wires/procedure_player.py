@@ -62,6 +62,25 @@ def schedule(x: NDArray[np.float64], params: ProcedurePlayerParams) -> NDArray:
     return start + np.concatenate([[0.0], np.cumsum(time)])
 
 
+def posture_at(
+    x: NDArray[np.float64], times: NDArray[np.float64], time: float
+) -> NDArray[np.float64]:
+    """The posture (7,) at a time in s, of postures (n, 7) reached at times (n,)."""
+    n = int(np.searchsorted(times, time))
+    if n == 0 or n == len(times):
+        return x[min(n, len(x) - 1)]
+    share = (time - times[n - 1]) / (times[n] - times[n - 1])
+    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
+    return between
+
+
+def target_of(x: NDArray[np.float64], snake: SnakeParams) -> ToolTarget:
+    """The tool's pose of a posture (7,), with its intermediate axis."""
+    c, h = np.empty((POINTS, 3)), snake.half_pitch
+    corners(x, h, snake.tool_offset, c)
+    return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
+
+
 class ProcedurePlayer(Block):
     """Plays the postures of a plan, at the rates the robot can keep.
 
@@ -121,16 +140,7 @@ class ProcedurePlayer(Block):
 
     def target(self, time: float) -> ToolTarget:
         """The tool's pose at a time in s."""
-        n = int(np.searchsorted(self._times, time))
-        if n == 0 or n == len(self._times):
-            x = self._x[min(n, len(self._x) - 1)]
-        else:
-            before, after = self._times[n - 1], self._times[n]
-            share = (time - before) / (after - before)
-            x = self._x[n - 1] + share * (self._x[n] - self._x[n - 1])
-        c, h = np.empty((POINTS, 3)), self._snake.half_pitch
-        corners(x, h, self._snake.tool_offset, c)
-        return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
+        return target_of(posture_at(self._x, self._times, time), self._snake)
 
     def _calc_target(self, context: Any) -> np.ndarray:
         return flat(self.target(context.get_time() + self._params.lead))

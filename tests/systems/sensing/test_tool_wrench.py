@@ -3,13 +3,14 @@
 import functools
 
 import numpy as np
-from pydrake.multibody.math import SpatialForce
+from pydrake.systems.framework import PortDataType
 import pytest
 
 from diagrams.common.run import simulate
 from diagrams.studies import load_scenario
 from diagrams.wrist.diagram import make_wrist_diagram
-from systems.common.signal import flat, view
+from plants.instruments.wrist_sensor import Felt
+from systems.common.signal import example, flat, view
 from systems.common.signals import Wrench
 from systems.sensing import sensor_noise
 from systems.sensing.tool_wrench import ToolWrench, ToolWrenchParams
@@ -67,14 +68,15 @@ def test_drift_goes_on_across_blocks():
     assert np.abs(steps).max() < 5.5
 
 
-def read(dut: ToolWrench, force: SpatialForce | None = None, time: float = 0.0):
+def read(dut: ToolWrench, force: float = 0.0, time: float = 0.0):
     context = dut.CreateDefaultContext()
     context.SetTime(time)
     for index in range(dut.num_input_ports()):
         port = dut.get_input_port(index)
-        port.FixValue(context, dut.AllocateInputAbstract(port))
-    if force is not None:
-        dut.GetInputPort("reaction_forces").FixValue(context, [force])
+        if port.get_data_type() == PortDataType.kAbstractValued:
+            port.FixValue(context, dut.AllocateInputAbstract(port))
+    felt = example(Felt)._replace(f=(force, 0.0, 0.0))
+    dut.GetInputPort("felt").FixValue(context, flat(felt))
     return view(Wrench, np.array(dut.GetOutputPort("wrench").Eval(context)))
 
 
@@ -86,11 +88,9 @@ def test_taring_takes_the_offset_away():
 
 
 def test_saturated_silent_and_nan_are_not_valid():
-    push = SpatialForce([0.0, 0.0, 0.0], [100.0, 0.0, 0.0])
-    hole = SpatialForce([0.0, 0.0, 0.0], [float("nan"), 0.0, 0.0])
     assert read(ToolWrench()).valid == 1.0
-    assert not flat(read(ToolWrench(), push)).any()
-    assert not flat(read(ToolWrench(), hole)).any()
+    assert not flat(read(ToolWrench(), 100.0)).any()
+    assert not flat(read(ToolWrench(), float("nan"))).any()
     dut = ToolWrench(ToolWrenchParams(lost=[1.0, 2.0]))
     assert [read(dut, time=t).valid for t in (0.5, 1.5, 2.5)] == [1.0, 0.0, 1.0]
 

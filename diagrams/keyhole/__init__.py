@@ -1,0 +1,1 @@
+"""Arm, breathing patient, tube and snake in one plant: a tumour resected."""

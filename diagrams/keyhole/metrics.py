@@ -1,0 +1,120 @@
+"""The figures of an operation through one trocar, all from true quantities."""
+
+from typing import Any
+
+import numpy as np
+
+from diagrams.bedside.wrist_metrics import rms
+from diagrams.resection.metrics import outside_depth
+from plants.tissue.labels import CRITICAL
+from systems.keyhole.phases import REASONS, Phases, Reason
+
+AFTER = 3.0
+"""Figures of force and fulcrum that end in `_3s` begin here, in s."""
+
+
+def tool_errors(run: Any) -> np.ndarray:
+    """Distance of the true tool from its reference, both in E, over time (n) in m."""
+    errors: np.ndarray = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
+    return errors
+
+
+def working(run: Any) -> np.ndarray:
+    """Whether the tool is at its plan, over time (n,)."""
+    code, snake = run.operation.phase.code, run.operation.snake
+    clock = snake.clock
+    at_plan = (np.round(code) == Phases.RESECT) & (snake.out >= 1.0) & (clock > 0.0)
+    after = np.maximum.accumulate(np.where(at_plan, 0.0, 1.0) * run.signals["time"])
+    settled: np.ndarray = at_plan & (run.signals["time"] - after > 1.0)
+    return settled
+
+
+def log_of_phases(run: Any) -> list[dict[str, Any]]:
+    """Each phase that was entered: name, time in s, reason."""
+    code, reason = run.operation.phase.code, run.operation.phase.reason
+    time = run.signals["time"]
+    first = np.flatnonzero(np.append(True, np.diff(code) != 0))
+    return [
+        {
+            "phase": Phases(round(code[i])).name.lower(),
+            "start": float(time[i]),
+            "reason": REASONS[Reason(round(reason[i]))],
+        }
+        for i in first
+    ]
+
+
+def withdrawals(run: Any) -> list[float]:
+    """How long the tool took to draw back, at each stop, in s."""
+    time, code = run.signals["time"], np.round(run.operation.phase.code)
+    retreat = run.operation.snake.retreat
+    found = []
+    for start in (
+        np.flatnonzero((code[1:] == Phases.STOPPED) & (np.diff(code) != 0)) + 1
+    ):
+        drawn = np.flatnonzero(retreat[start:] >= 1.0 - 1e-9)
+        if len(drawn):
+            since = float(run.operation.phase.since[start])
+            found.append(float(time[start + drawn[0]]) - since)
+    return found
+
+
+def measure(run: Any) -> dict[str, Any]:
+    """The figures of a run, as `metrics.json` keeps them."""
+    time, late = run.signals["time"], run.signals["time"] >= AFTER
+    force = np.linalg.norm(run.wall.force.f, axis=1)
+    off = run.wall.fulcrum_error.distance
+    at_work = working(run)
+    errors = tool_errors(run)[at_work]
+    organ = np.linalg.norm(run.organ.estimate.p - run.organ.true.p, axis=1)
+    phases = log_of_phases(run)
+    gate = [one["start"] for one in phases if one["phase"] == "resect"]
+    drawn = withdrawals(run)
+    figures: dict[str, Any] = {
+        "rms_tool_error": rms(errors),
+        "max_tool_error": float(errors.max(initial=0.0)),
+        "time_at_work": float(at_work.mean() * time[-1]),
+        "rms_lateral_force": rms(force[late]),
+        "max_lateral_force_3s": float(force[late].max(initial=0.0)),
+        "max_lateral_force": float(force.max()),
+        "rms_fulcrum_error": rms(off[late]),
+        "max_fulcrum_error_3s": float(off[late].max(initial=0.0)),
+        "rms_organ_error": rms(organ[at_work]),
+        "max_organ_error": float(organ[at_work].max(initial=0.0)),
+        "max_coupler_error": float(run.snake.coupler_error.angle.max()),
+        "gate_opened": gate[0] if gate else None,
+        "withdrawal_time": max(drawn) if drawn else None,
+        "ik_refused": float((run.ik.status.code[at_work] != 0).mean())
+        if any(at_work)
+        else 0.0,
+        "drums_limited": float((run.drums.limited.code[at_work] != 0).mean())
+        if any(at_work)
+        else 0.0,
+        "estimates_refused": int(run.wrist.fulcrum.refused[-1]),
+        "jumps_followed": int(run.wrist.fulcrum.jumps[-1]),
+        "stops": [one for one in phases if one["phase"] == "stopped"],
+        "phases": phases,
+    }
+    if run.case.resection is not None:
+        figures |= resected(run)
+    return figures
+
+
+def resected(run: Any) -> dict[str, Any]:
+    """The tissue's share of the figures."""
+    session, reach = run.case.session, run.case.resection.reach
+    station = run.diagram.GetSubsystemByName("station")
+    volume = station.GetSubsystemByName("tissue_carver").carving.volume
+    removed, touched = run.tissue.removed, run.tissue.touched
+    nearest = float(touched.critical_distance[-1])
+    return {
+        "tumour_volume": session.volume.tumour_volume,
+        "resected_fraction": float(removed.tumour[-1]) / session.volume.tumour_volume,
+        "planned_fraction": session.fraction,
+        "reachable_fraction": reach.fraction if reach else None,
+        "healthy_removed": float(removed.healthy[-1]),
+        "max_outside_depth": outside_depth(volume),
+        "body_collisions": int(touched.hits[-1]),
+        "min_critical_distance": nearest if nearest >= 0.0 else None,
+        "critical_touched": bool((volume.labels == CRITICAL).any() and nearest <= 0.0),
+    }

@@ -1,0 +1,267 @@
+"""The scenario of an operation through one trocar: all parameters, and checks."""
+
+from dataclasses import dataclass, replace
+import math
+
+import numpy as np
+
+from diagrams.bedside.bedside import ToolAtStart
+from diagrams.bedside.wrist import WristSettings, check_wrist
+from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.resection.scenario import ResectionScenario
+from diagrams.resection.scenario import check as check_resection
+from plants.abdomen.abdomen import AbdomenParams
+from plants.abdomen.organ_motion import OrganMotionParams
+from plants.arm.arm import ArmParams
+from plants.instruments.tube import TubeParams
+from plants.snake.inverse_kinematics import tool_postures
+from plants.snake.parameters import SnakeParams
+from plants.snake.reachability import why_not
+from plants.surgeon.recording import load_recording
+from plants.tissue.volume import Access
+from systems.common.parameter import Rules, parameter, part
+from systems.common.reach_limits import ReachLimits
+from systems.keyhole.phases import PhasesParams
+from systems.keyhole.snake_task import SnakeTaskParams
+from systems.keyhole.tube_task import TubeTaskParams
+from systems.motion.joint_commands import JointCommandsParams
+from systems.resection.wires.resection_ik import ResectionIkParams
+from systems.resection.wires.tip_reference import CircleParams, circle_target
+from systems.resection.wires.wire_drums import WireDrumsParams
+from systems.sensing.optical_tracker import MarkerBody, OpticalTrackerParams
+from systems.sensing.organ_estimator import OrganEstimatorParams
+
+TASKS = ("circle", "resect")
+PERIOD = 1.0 / 120.0
+TURN = 120
+"""Postures of a turn of the circle."""
+
+
+@dataclass
+class QuickIk(ResectionIkParams):
+    """Quick enough to follow an organ."""
+
+    bend_rate: float = parameter(
+        4.0, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+    )
+    travel_rate: float = parameter(
+        0.06, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+    )
+
+
+@dataclass
+class QuickDrums(WireDrumsParams):
+    """Quick enough to follow an organ."""
+
+    wire_rate: float = parameter(
+        0.1, "largest speed of a wire", "m/s", least=1e-3, most=1.0
+    )
+    travel_rate: float = parameter(
+        0.08, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+    )
+
+
+@dataclass
+class OrganOperation(ResectionScenario):
+    """A resection whose frame is the organ's, with more room for what it misses."""
+
+    access: Access = part(lambda: Access(direction=[0.0, 0.0, -1.0]))
+    automatic: bool = parameter(True, "whether the planner goes on after procedures")
+    clearance: float = parameter(
+        0.15e-3, "between body and tissue in the plan", "m", least=0.0, most=0.01
+    )
+    accuracy: float = parameter(
+        0.05e-3,
+        "by which the plan takes the tool for smaller where it frees space",
+        "m",
+        least=0.0,
+        most=0.01,
+    )
+    period: float = parameter(
+        PERIOD,
+        "of drums and inverse kinematics, the wrist's",
+        "s",
+        least=1e-3,
+        most=0.1,
+    )
+    resection_ik: QuickIk = part(QuickIk)
+    drums: QuickDrums = part(QuickDrums)
+
+
+@dataclass
+class OrganMarkers(MarkerBody):
+    """Markers on the organ itself: 0.1 mm of white noise along each axis."""
+
+    noise: float = parameter(
+        3.5e-4, "rms error of one marker in three dimensions", "m", least=0, most=0.01
+    )
+    lever: float = parameter(
+        0.0, "from the markers' mean to the entry", "m", least=0, most=2
+    )
+
+
+@dataclass
+class OrganTracker(OpticalTrackerParams):
+    """What sees the organ, 33 ms late."""
+
+    latency: float = parameter(
+        1 / 30, "until a frame is delivered", "s", least=0, most=1
+    )
+    body: OrganMarkers = part(OrganMarkers)
+
+
+@dataclass
+class Entry:
+    """Where the organ is entered, the breath in its middle."""
+
+    p_WE: list[float] = parameter(
+        [0.0, 0.0, -0.12], "the entry", "m", least=-0.5, most=0.5, shape=(3,)
+    )
+
+
+@dataclass
+class KeyholeScenario(Scenario, WristSettings):
+    """One patient, one plant: tube and snake through the trocar of who breathes."""
+
+    task: str = parameter("circle", "what the tool does in the organ", choices=TASKS)
+    known_organ: bool = parameter(
+        False, "whether the organ's motion is told, for comparison"
+    )
+    snake_follows: bool = parameter(
+        True, "whether the snake makes up for what the tube misses, for comparison"
+    )
+    robot: ToolAtStart = part(ToolAtStart)
+    entry: Entry = part(Entry)
+    organ_motion: OrganMotionParams = part(OrganMotionParams)
+    organ_tracker: OrganTracker = part(OrganTracker)
+    organ_estimator: OrganEstimatorParams = part(OrganEstimatorParams)
+    phases: PhasesParams = part(PhasesParams)
+    tube_task: TubeTaskParams = part(TubeTaskParams)
+    snake_task: SnakeTaskParams = part(SnakeTaskParams)
+    circle: CircleParams = part(CircleParams)
+    operation: OrganOperation = part(OrganOperation)
+    joints: JointCommandsParams = part(JointCommandsParams)
+    arm: ArmParams = part(ArmParams)
+    instrument: TubeParams = part(TubeParams)
+    abdomen: AbdomenParams = part(AbdomenParams)
+
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        standoff, gap = self.tube_task.standoff, self.instrument.gap
+        yield standoff >= gap, "tube_task", f"standoff >= instrument.gap={gap} m"
+
+    @property
+    def axis(self) -> np.ndarray:
+        """z_E, from the trocar to the entry, both at rest, (3,)."""
+        z = np.subtract(self.entry.p_WE, self.robot.p_WG)
+        return z / np.linalg.norm(z)
+
+    @property
+    def x_axis(self) -> np.ndarray:
+        """x_E, as near to the world's x as it goes, (3,)."""
+        x = np.array([1.0, 0.0, 0.0]) - self.axis[0] * self.axis
+        return x / np.linalg.norm(x)
+
+    @property
+    def R_WE(self) -> np.ndarray:
+        """Orientation of E."""
+        return np.column_stack(
+            [self.x_axis, np.cross(self.axis, self.x_axis), self.axis]
+        )
+
+    @property
+    def planned(self) -> OrganOperation:
+        """The resection with a snake whose base stays out of the tube."""
+        snake = self.operation.snake
+        travel = [-self.instrument.gap, snake.travel[1]]
+        player = replace(self.operation.player, lead=self.operation.period)
+        return replace(
+            self.operation,
+            seed=self.seed,
+            snake=replace(snake, travel=travel),
+            player=player,
+        )
+
+    @property
+    def in_tube(self) -> SnakeParams:
+        """The snake with the stroke that it has in its tube."""
+        snake = self.operation.snake
+        return replace(snake, travel=[-self.instrument.gap - 0.06, snake.travel[1]])
+
+
+def circle_postures(scenario: KeyholeScenario) -> tuple[np.ndarray, np.ndarray]:
+    """Postures of a turn of the circle and its times, at full speed.
+
+    Raises:
+        ScenarioError: If it is out of the snake's reach; where, and why.
+    """
+    circle = replace(scenario.circle, ramp=1e-6)
+    times = np.linspace(0.0, circle.period, TURN + 1)
+    poses = [circle_target(circle, t) for t in times]
+    solved = [tool_postures(*pose, scenario.in_tube) for pose in poses]
+    for pose, one in zip(poses, solved, strict=True):
+        if not one.reached:
+            raise ScenarioError(f"circle: {why_not(*pose, scenario.in_tube)}")
+    return np.array([one.x for one in solved]), times
+
+
+def check(scenario: KeyholeScenario) -> None:
+    """Raises ScenarioError for a scenario that cannot run."""
+    check_wrist(scenario)
+    check_resection(scenario.operation)
+    if abs(scenario.operation.period - scenario.joints.period) > 1e-9:
+        raise ScenarioError(
+            f"operation.period={scenario.operation.period} s: expected joints.period="
+            f"{scenario.joints.period} s; arm and snake share their instants"
+        )
+    _check_reach(scenario)
+    if scenario.task == "circle":
+        circle_postures(scenario)
+    if scenario.organ_motion.recording:
+        load_recording(scenario.organ_motion.recording)
+
+
+def _check_reach(scenario: KeyholeScenario) -> None:
+    """Tube and trocar must reach the station, at rest and over a breath."""
+    limits, length = ReachLimits(), scenario.instrument.length
+    p_WG, p_WE = np.array(scenario.robot.p_WG), np.array(scenario.entry.p_WE)
+    depth = float(np.linalg.norm(p_WE - p_WG))
+    tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
+    least = depth - scenario.tube_task.standoff
+    most = depth - scenario.instrument.gap
+    if tilt > limits.max_tilt:
+        raise ScenarioError(
+            f"entry.p_WE={scenario.entry.p_WE}: it lies {math.degrees(tilt):.0f} deg "
+            f"off the vertical of the trocar, expected at most "
+            f"{math.degrees(limits.max_tilt):.0f}; {better_trocars(scenario)}"
+        )
+    if not (limits.min_insertion <= least and most <= limits.max_insertion):
+        low = limits.min_insertion + scenario.tube_task.standoff
+        high = limits.max_insertion + scenario.instrument.gap
+        raise ScenarioError(
+            f"entry.p_WE={scenario.entry.p_WE}: it lies {depth:.3f} m from the trocar, "
+            f"expected {low:.3f} to {high:.3f}; {better_trocars(scenario)}"
+        )
+    if length - scenario.instrument.mount_length < most + 0.02:
+        raise ScenarioError(
+            f"instrument.length={length} m: the tube is too short, the mount would "
+            f"meet the trocar; expected >= "
+            f"{most + 0.02 + scenario.instrument.mount_length:.3f}"
+        )
+
+
+def better_trocars(scenario: KeyholeScenario) -> str:
+    """Which places on the wall would do, in words."""
+    limits = ReachLimits()
+    x, y, z = scenario.entry.p_WE
+    down = scenario.robot.p_WG[2] - z
+    low = limits.min_insertion + scenario.tube_task.standoff
+    high = limits.max_insertion + scenario.instrument.gap
+    far = min(math.sqrt(max(high**2 - down**2, 0.0)), down * math.tan(limits.max_tilt))
+    near = math.sqrt(max(low**2 - down**2, 0.0))
+    if far <= near or down <= 0.0:
+        return f"no trocar at this height reaches it: {low:.3f} to {high:.3f} m below"
+    return (
+        f"a trocar {1e3 * near:.0f} to {1e3 * far:.0f} mm beside "
+        f"[{x:.3f}, {y:.3f}] on the wall would do"
+    )

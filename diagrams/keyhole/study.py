@@ -1,0 +1,88 @@
+"""The operation through one trocar as a study: logged, measured, plotted and shown."""
+
+from typing import Any
+
+from pydrake.systems.analysis import SimulatorConfig
+
+from diagrams.bedside.bedside import stiffen
+from diagrams.bedside.wrist import WRIST_SIGNALS
+from diagrams.common.study import Study, View, cenic
+from diagrams.keyhole.diagram import make_keyhole_diagram
+from diagrams.keyhole.metrics import measure
+from diagrams.keyhole.operation import LOG_PERIOD, length, outline, prepare
+from diagrams.keyhole.plots import plots
+from diagrams.keyhole.replay import decorate
+from diagrams.keyhole.scenario import KeyholeScenario, check
+from plants.abdomen.wall_force import FulcrumError
+from plants.snake.signals import ToolPose
+from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
+from systems.common.signals import Force, MovingPoint, RobotTool
+from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
+from systems.motion.joint_commands import Status
+from systems.resection.wires.resection_ik import IkStatus
+from systems.resection.wires.snake_location import Bends, CouplerError
+from systems.resection.wires.wire_drums import Limited
+from systems.resection.wires.wire_watch import Alarm
+from systems.sensing.organ_estimator import OrganMotion
+
+SIGNALS = WRIST_SIGNALS | {
+    "robot.tool": RobotTool,
+    "joints.status": Status,
+    "wall.force": Force,
+    "wall.fulcrum_error": FulcrumError,
+    "operation.phase": Phase,
+    "operation.tube": TubeStatus,
+    "operation.snake": SnakeStatus,
+    "organ.true": MovingPoint,
+    "organ.estimate": OrganMotion,
+    "tip.reference": ToolPose,
+    "snake.tool": ToolPose,
+    "snake.posture": Bends,
+    "snake.coupler_error": CouplerError,
+    "ik.status": IkStatus,
+    "drums.limited": Limited,
+    "watch.alarm": Alarm,
+}
+TISSUE = {
+    "tissue.index": Moves,
+    "tissue.removed": Removed,
+    "tissue.touched": Touched,
+    "tissue.way": Way,
+}
+
+
+def signals(scenario: KeyholeScenario) -> dict[str, Any]:
+    """What is logged: tissue only where there is some."""
+    return SIGNALS | (TISSUE if scenario.task == "resect" else {})
+
+
+def integrator(scenario: KeyholeScenario) -> SimulatorConfig:
+    """CENIC with one implicit step a control instant: its commands come so often."""
+    config = cenic(scenario.joints.period)
+    config.use_error_control = False
+    config.accuracy = 1e-4  # of its solver: at 1e-2 the wrist hears it
+    return config
+
+
+STUDY = Study(
+    name="keyhole",
+    scenario=KeyholeScenario,
+    make_diagram=make_keyhole_diagram,
+    check=check,
+    measure=measure,
+    signals=signals,
+    log_period=LOG_PERIOD,
+    plots=plots,
+    decorate=decorate,
+    controller="passive_wrist",
+    adjust=stiffen,
+    integrator=integrator,
+    required=("system", "duration", "task", "robot.p_WG", "robot.p_WP"),
+    view=View(camera=(0.42, -0.60, 0.16), target=(-0.06, 0.0, 0.0)),
+    close_up=View(camera=(0.07, -0.13, -0.08), target=(0.0, 0.0, -0.115)),
+    length=length,
+    prepare=prepare,
+    outline=outline,
+    replay_length=60.0,
+)
+"""The operation through one trocar."""

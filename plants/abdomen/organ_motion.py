@@ -1,0 +1,101 @@
+"""How an organ moves: with the breath of the wall, or as it was recorded.
+
+A point of an abdominal organ moves along its own line, in phase with the wall or
+behind it; liver and kidneys move 5 to 25 mm from head to foot. It does not turn.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from pydrake.systems.primitives import TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial, StackedTrajectory
+
+from plants.abdomen.wall_motion import WallMotionParams, wave
+from plants.surgeon.recording import load_recording
+from systems.common.parameter import check, parameter
+
+_KNOT = 1.0 / 120.0  # [s]
+
+
+@dataclass
+class OrganMotionParams:
+    """Motion of the organ; vectors in W."""
+
+    breathing: list[float] = parameter(
+        [0.0, 0.0, 0.0], "its amplitude", "m", least=-0.03, most=0.03, shape=(3,)
+    )
+    lag: float = parameter(
+        0.0, "behind the wall, in breaths; 0.5 is antiphase", least=-1.0, most=1.0
+    )
+    cough: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "how far one throws it",
+        "m",
+        least=-0.03,
+        most=0.03,
+        shape=(3,),
+    )
+    recording: str = parameter(
+        "", "of its displacement, t,x,y,z, again and again; none if empty", file=True
+    )
+
+    def displacement(self, time: float, wall: WallMotionParams) -> np.ndarray:
+        """From its place at rest, in m (3)."""
+        thrown = wall.irregular.coughing(time) * np.array(self.cough)
+        if self.recording:
+            return thrown + _recorded(self.recording, time)
+        phase, depth = wall.irregular.breath(time, wall.rate)
+        g = wave(wall.wave, phase + wall.phase - self.lag)
+        whole: np.ndarray = thrown + np.array(self.breathing) * (
+            depth * (g + 1.0) - 1.0 if wall.irregular.disturbed else g
+        )
+        return whole
+
+
+_load = lru_cache(maxsize=4)(load_recording)
+
+
+def _recorded(path: str, time: float) -> np.ndarray:
+    """A recording's displacement from its mean, played again and again."""
+    times, points = _load(path)
+    at = time % times[-1]
+    return np.array([np.interp(at, times, axis - axis.mean()) for axis in points.T])
+
+
+def organ_trajectory(
+    params: OrganMotionParams, wall: WallMotionParams, p_W: Any, duration: float
+) -> PiecewisePolynomial:
+    """Where a point of the organ is over time, p_W its place at rest, in m (3).
+
+    Raises:
+        ValueError: If a parameter or the recording makes no sense.
+    """
+    check(params)
+    times = np.arange(0.0, duration + 1.0, _KNOT)
+    rows = np.array([params.displacement(t, wall) for t in times.tolist()])
+    slopes = np.gradient(rows, times, axis=0)
+    return PiecewisePolynomial.CubicHermite(times, (np.asarray(p_W) + rows).T, slopes.T)
+
+
+def add_organ_motion(builder: Any, motion: PiecewisePolynomial, u: Any) -> Any:
+    """Adds what moves an organ's point.
+
+    Args:
+        builder: The diagram's builder.
+        motion: Of `organ_trajectory`.
+        u: An axis fixed to the organ, (3).
+
+    Returns:
+        The sources `organ_motion`, whose port emits a `MovingPoint`, p_WE and v_WE,
+        and `organ_shaft`, which emits point and axis as a `Shaft`, for a tracker.
+    """
+    source = builder.AddNamedSystem("organ_motion", TrajectorySource(motion, 1))
+    seen = motion.Clone()
+    ends = [motion.start_time(), motion.end_time()]
+    axis = PiecewisePolynomial.ZeroOrderHold(ends, np.tile(u, (2, 1)).T)
+    shaft = StackedTrajectory()
+    shaft.Append(seen)
+    shaft.Append(axis)
+    return source, builder.AddNamedSystem("organ_shaft", TrajectorySource(shaft))

@@ -1,0 +1,98 @@
+"""Where the snake truly is in the organ that it operates on.
+
+Tube and organ move, the organ's tissue is kept in the frame E of its entry. What cuts
+there is the tool with the last module: their pose in E is exact. The modules before
+are taken as the inverse kinematics has them for a channel that stands still in E.
+"""
+
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+
+from plants.snake.inverse_kernels import REACHED
+from plants.snake.inverse_kinematics import tool_posture
+from plants.snake.kinematics import POINTS, corners, link_axis
+from plants.snake.parameters import SnakeParams
+from plants.snake.signals import Posture, ToolPose
+from systems.common.block import Block
+from systems.common.signal import flat, vector
+from systems.common.signals import MovingPoint
+
+Floats = np.ndarray
+
+
+class SnakeInOrgan(Block):
+    """The snake as the organ's tissue feels it.
+
+    Port ``posture`` accepts the snake's true `Posture` in its channel.
+
+    Port ``body_poses`` accepts the plant's port of that name.
+
+    Port ``entry`` accepts the true entry p_WE, a `MovingPoint`.
+
+    Port ``posture_E`` emits the `Posture` of the same tool in E.
+
+    Port ``tool`` emits the `ToolPose` in E.
+    """
+
+    def __init__(
+        self,
+        snake: SnakeParams,
+        tube: int,
+        channel: float,
+        R_WE: Floats,
+    ) -> None:
+        """Makes the block.
+
+        Args:
+            snake: Geometry, its travel that of the snake in its tube.
+            tube: Place of the tube in `body_poses`.
+            channel: Distance of frame C from the tube's origin along its z axis, in m.
+            R_WE: Orientation of E, which the organ keeps.
+        """
+        super().__init__()
+        self._snake, self._body, self._channel = snake, tube, channel
+        self._R_WE = R_WE
+        self._length = 3 * snake.straight_module + snake.tool_offset
+        self._posture = self.signal_in("posture", Posture)
+        self._poses = self.DeclareAbstractInputPort(
+            "body_poses", Value([RigidTransform()])
+        )
+        self._entry = self.signal_in("entry", MovingPoint)
+        reads = {
+            self._posture.ticket(),
+            self._poses.ticket(),
+            self._entry.ticket(),
+            self.time_ticket(),
+        }
+        self._target = self.cached("target", self._calc_target, reads)
+        known = {self._target.ticket()}
+        self.signal_out("posture_E", Posture, self._calc_posture, known)
+        self.signal_out("tool", ToolPose, self._calc_tool, known)
+
+    def _calc_target(self, context: Any) -> Floats:
+        """Tool, its axis and the intermediate axis in E, (9,)."""
+        x = self._posture.Eval(context)
+        c, h = np.empty((POINTS, 3)), self._snake.half_pitch
+        corners(x, h, self._snake.tool_offset, c)
+        X_WM = self._poses.Eval(context)[self._body]
+        R_WM = X_WM.rotation().matrix()
+        p_WC = X_WM.translation() + self._channel * R_WM[:, 2]
+        R_EC = self._R_WE.T @ R_WM
+        p = self._R_WE.T @ (p_WC - self._entry.Eval(context)[:3]) + R_EC @ c[-1]
+        axes = [R_EC @ np.array(link_axis(c, i, h)) for i in (5, 3)]
+        return np.concatenate([p, *axes])
+
+    def _calc_posture(self, context: Any) -> Floats:
+        target = self._target.Eval(context)
+        x, status = tool_posture(target, self._snake)
+        if status == REACHED:
+            return np.array(x)
+        # Far outside the organ: straight, the tool at its depth.
+        return np.array([target[2] - self._length, *np.zeros(6)])
+
+    def _calc_tool(self, context: Any) -> Floats:
+        target = self._target.Eval(context)
+        return flat(ToolPose(vector(target[:3]), vector(target[3:6])))

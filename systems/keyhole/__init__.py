@@ -1,0 +1,1 @@
+"""One operation through one trocar: its phases, the tube's task, the snake's task."""

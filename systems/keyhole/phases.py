@@ -1,0 +1,284 @@
+"""The phases of an operation as a statechart: probe, approach, station, resect, ...
+
+Each transition has its condition and its reason. The tool leaves the tube in one phase
+alone, RESECT, which is entered through the gate: tube at its station, shaft unloaded,
+fulcrum and organ known, everything calm for a while.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import across, along, norm, sub
+from systems.common.parameter import check, parameter
+from systems.common.signal import Vector, finiteness
+from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
+from systems.common.step_block import StepBlock
+from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
+from systems.resection.wires.wire_watch import Alarm
+from systems.sensing.organ_estimator import OrganMotion
+
+
+class Phases(IntEnum):
+    """Of an operation."""
+
+    PROBE = 0
+    APPROACH = 1
+    STATION = 2
+    RESECT = 3
+    RETRACT = 4
+    STOPPED = 5
+
+
+class Reason(IntEnum):
+    """Why a phase was entered; `REASONS` has their texts."""
+
+    BEGIN = 0
+    PROBED = 1
+    ARRIVED = 2
+    GATE = 3
+    DONE = 4
+    ORGAN = 5
+    LOADED = 6
+    SENSOR = 7
+    WIRE = 8
+    NUMBERS = 9
+    CALM = 10
+    GIVEN_UP = 11
+    AWAY = 12
+
+
+REASONS = {
+    Reason.BEGIN: "the operation begins",
+    Reason.PROBED: "the wall has been probed",
+    Reason.ARRIVED: "the tube is at its station",
+    Reason.GATE: "tube unloaded, fulcrum and organ known: the gate is open",
+    Reason.DONE: "the plan is done",
+    Reason.ORGAN: "the organ does not move as it did: a cough, a held breath",
+    Reason.LOADED: "the wall is loaded",
+    Reason.SENSOR: "the wrist does not permit motion",
+    Reason.WIRE: "a wire is slack",
+    Reason.NUMBERS: "an input is not a number",
+    Reason.CALM: "everything is calm again",
+    Reason.GIVEN_UP: "it does not become calm: the tool goes home",
+    Reason.AWAY: "the tube has left its station",
+}
+
+
+@dataclass
+class PhasesParams:
+    """Conditions of the transitions."""
+
+    near: float = parameter(
+        1.5e-3, "distance of the tube from its station", "m", above=0.0, most=0.02
+    )
+    slow: float = parameter(
+        5e-3, "its speed against the station", "m/s", above=0.0, most=0.1
+    )
+    far: float = parameter(
+        8e-3, "distance at which it has left its station", "m", above=0.0, most=0.05
+    )
+    unloaded: float = parameter(
+        0.3, "smoothed lateral force at the gate", "N", above=0.0, most=5.0
+    )
+    loaded: float = parameter(
+        3.0, "smoothed lateral force that stops", "N", above=0.0, most=20.0
+    )
+    smooth: float = parameter(
+        0.5, "time constant of the force", "s", above=0.0, most=10.0
+    )
+    sure_across: float = parameter(
+        1e-3, "sigma of the fulcrum across the shaft", "m", above=0.0, most=0.02
+    )
+    sure_organ: float = parameter(
+        6e-4, "sigma of the organ's motion", "m", above=0.0, most=0.02
+    )
+    calm: float = parameter(
+        2.0, "how long all must hold at the gate", "s", least=0.0, most=60.0
+    )
+    patience: float = parameter(
+        60.0, "how long it waits before the tool goes home", "s", above=0.0, most=1e4
+    )
+    period: float = parameter(1 / 120, "of the update", "s", above=0.0, most=0.1)
+
+
+class Chart(NamedTuple):
+    """The statechart's memory: phase, its start and reason, calm so far, force."""
+
+    code: float
+    since: float
+    reason: float
+    calm: float
+    force: Vector
+
+
+_PROBE, _APPROACH, _STATION = map(float, (0, 1, 2))
+_RESECT, _RETRACT, _STOPPED = map(float, (3, 4, 5))
+finite_organ, finite_fulcrum = finiteness(OrganMotion), finiteness(Fulcrum)
+finite_tube, finite_snake = finiteness(TubeStatus), finiteness(SnakeStatus)
+finite_alarm, finite_permission = finiteness(Alarm), finiteness(Permission)
+
+
+@compiled
+def fault(
+    c: Any,
+    chart: Chart,
+    tube: TubeStatus,
+    organ: OrganMotion,
+    alarm: Alarm,
+    permission: Permission,
+) -> float:
+    """The `Reason` to stop, or 0."""
+    if alarm.time >= 0.0:
+        return 8.0
+    if organ.alarm != 0.0 or organ.sure == 0.0:
+        return 5.0
+    if permission.speed_scale <= 0.0:
+        return 7.0
+    if norm(chart.force) > c.loaded:
+        return 6.0
+    return 12.0 if tube.distance > c.far else 0.0
+
+
+@compiled
+def is_calm(c: Any, chart: Chart, organ: OrganMotion, fulcrum: Fulcrum) -> bool:
+    """Whether the gate may open: unloaded, fulcrum and organ known."""
+    sure = fulcrum.sigma_across < c.sure_across and organ.sigma < c.sure_organ
+    return norm(chart.force) < c.unloaded and organ.sure == 1.0 and sure
+
+
+@compiled
+def entered(chart: Chart, code: float, time: float, reason: float) -> Chart:
+    """The chart in another phase."""
+    return Chart(code, time, reason, 0.0, chart.force)
+
+
+@compiled
+def step(
+    c: Any,
+    chart: Chart,
+    time: float,
+    tube: TubeStatus,
+    snake: SnakeStatus,
+    organ: OrganMotion,
+    fulcrum: Fulcrum,
+    shaft: ShaftMotion,
+    wrench: Wrench,
+    permission: Permission,
+    alarm: Alarm,
+) -> Chart:
+    """One step of the statechart."""
+    sound = finite_tube(tube) and finite_snake(snake) and finite_organ(organ)
+    sound = sound and finite_fulcrum(fulcrum) and finite_permission(permission)
+    if not (sound and finite_alarm(alarm)):
+        if chart.code == _STOPPED or chart.code == _RETRACT:
+            return Chart(chart.code, chart.since, chart.reason, 0.0, chart.force)
+        return entered(chart, _STOPPED, time, 9.0)
+    force = chart.force
+    if wrench.valid > 0.5:
+        now = across(wrench.f, shaft.u)
+        force = along(force, c.period / c.smooth, sub(now, force))
+        if not norm(force) < 1e9:
+            force = chart.force
+    chart = Chart(chart.code, chart.since, chart.reason, chart.calm, force)
+    why = fault(c, chart, tube, organ, alarm, permission)
+    arrived = tube.distance < c.near and tube.speed < c.slow
+    quiet = is_calm(c, chart, organ, fulcrum) and arrived and why == 0.0
+    calm = chart.calm + c.period if quiet else 0.0
+    chart = Chart(chart.code, chart.since, chart.reason, calm, force)
+    code = chart.code
+    if code == _PROBE and permission.speed_scale > 0.0 and time > c.smooth:
+        return entered(chart, _APPROACH, time, 1.0)
+    if code == _APPROACH and arrived:
+        return entered(chart, _STATION, time, 2.0)
+    if code == _STATION and calm >= c.calm:
+        return entered(chart, _RESECT, time, 3.0)
+    if code == _RESECT and why != 0.0:
+        return entered(chart, _STOPPED, time, why)
+    if code == _RESECT and snake.left <= 0.0:
+        return entered(chart, _RETRACT, time, 4.0)
+    if code == _STOPPED and calm >= c.calm:
+        return entered(chart, _RESECT, time, 10.0)
+    if code == _STOPPED and time - chart.since > c.patience:
+        return entered(chart, _RETRACT, time, 11.0)
+    return chart
+
+
+@compiled
+def _update(
+    c: Any,
+    phase: Phase,
+    chart: Chart,
+    time: float,
+    tube: TubeStatus,
+    snake: SnakeStatus,
+    organ: OrganMotion,
+    fulcrum: Fulcrum,
+    shaft: ShaftMotion,
+    wrench: Wrench,
+    permission: Permission,
+    alarm: Alarm,
+) -> tuple[Phase, Chart]:
+    chart = step(
+        c,
+        chart,
+        time,
+        tube,
+        snake,
+        organ,
+        fulcrum,
+        shaft,
+        wrench,
+        permission,
+        alarm,
+    )
+    pace = permission.speed_scale if finite_permission(permission) else 0.0
+    return Phase(chart.code, chart.since, chart.reason, pace), chart
+
+
+class OperationPhases(StepBlock):
+    """The statechart of an operation.
+
+    Port ``tube`` accepts the `TubeStatus`.
+
+    Port ``snake`` accepts the `SnakeStatus`.
+
+    Port ``organ`` accepts the entry's `OrganMotion`.
+
+    Port ``fulcrum`` accepts the estimated `Fulcrum`.
+
+    Port ``shaft`` accepts the `ShaftMotion`.
+
+    Port ``wrench`` accepts the `Wrench`.
+
+    Port ``permission`` accepts the passive wrist's `Permission`.
+
+    Port ``alarm`` accepts the wires' `Alarm`.
+
+    Port ``phase`` emits the `Phase`, from the next instant on.
+    """
+
+    def __init__(self, params: PhasesParams | None = None) -> None:
+        """Makes the block."""
+        super().__init__()
+        params = check(params or PhasesParams())
+        self.declare_update(
+            _update,
+            [packed(params)],
+            {
+                "tube": TubeStatus,
+                "snake": SnakeStatus,
+                "organ": OrganMotion,
+                "fulcrum": Fulcrum,
+                "shaft": ShaftMotion,
+                "wrench": Wrench,
+                "permission": Permission,
+                "alarm": Alarm,
+            },
+            {
+                "phase": Phase(0.0, 0.0, 0.0, 0.0),
+                "_chart": Chart(0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)),
+            },
+            params.period,
+        )

@@ -1,0 +1,145 @@
+"""Tube and snake: kinematics against the plant's, and the way out and back."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import Simulator
+import pytest
+
+from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
+from plants.arm.parameters import READY_POSTURE
+from plants.arm.signals import ArmState
+from plants.instruments.tube import TubeParams
+from plants.snake.drive import SnakeDriveParams
+from plants.snake.parameters import SnakeParams
+from plants.snake.signals import ToolTarget
+from plants.snake.snake import add_snake
+from systems.common.signal import example, flat, view
+from systems.common.signals import ToolMotion
+from systems.keyhole.phases import Phases
+from systems.keyhole.signals import Phase, SnakeStatus, TubePose, TubeStatus
+from systems.keyhole.snake_load import weight_of
+from systems.keyhole.snake_task import SnakeTask, in_channel
+from systems.keyhole.tube_location import TubeLocation
+from systems.keyhole.tube_task import TubeTask, TubeTaskParams
+from systems.sensing.organ_estimator import OrganMotion
+
+
+def test_tube_pose_is_the_plants():
+    rng = np.random.default_rng(1)
+    tube = TubeParams()
+    plant = make_controller_plant(instrument=tube)
+    context = plant.CreateDefaultContext()
+    dut = TubeLocation(tube, lead=0.01)
+    own = dut.CreateDefaultContext()
+    for _ in range(5):
+        q = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
+        v = rng.uniform(-0.5, 0.5, 7)
+        dut.GetInputPort("arm_state").FixValue(own, flat(ArmState(tuple(q), tuple(v))))
+        seen = view(TubePose, np.array(dut.GetOutputPort("tube").Eval(own)))
+        plant.SetPositions(context, q + 0.01 * v)
+        X = plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(context)
+        np.testing.assert_allclose(seen.p, X.translation(), atol=1e-12)
+        np.testing.assert_allclose(seen.x, X.rotation().col(0), atol=1e-12)
+        np.testing.assert_allclose(seen.z, X.rotation().col(2), atol=1e-12)
+
+
+def test_weight_of_the_straight_snake():
+    plant = MultibodyPlant(0.0)
+    snake, drive = SnakeParams(), SnakeDriveParams()
+    instance = add_snake(plant, plant.world_frame(), snake, drive).instance
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    mass, centre = weight_of(snake, drive)
+    assert plant.CalcTotalMass(context, [instance]) == pytest.approx(mass)
+    p = plant.CalcCenterOfMassPositionInWorld(context, [instance])
+    assert p[2] == pytest.approx(centre)
+
+
+def test_a_target_in_the_organ_is_one_in_the_channel():
+    rng = np.random.default_rng(2)
+    for _ in range(5):
+        A, B = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
+        R_WE, R_WC = (R * np.sign(np.linalg.det(R)) for R in (A, B))
+        p_WE, p_WP, p_E = rng.normal(size=(3, 3))
+        tube = TubePose(p_WP, R_WC[:, 0], R_WC[:, 2])
+        target = ToolTarget(p_E, *np.eye(3)[:2])
+        out = in_channel(target, R_WE, p_WE, tube, 0.04)
+        p_WC = p_WP + 0.04 * R_WC[:, 2]
+        np.testing.assert_allclose(p_WC + R_WC @ out[:3], p_WE + R_WE @ p_E, atol=1e-12)
+        np.testing.assert_allclose(R_WC @ out[3:6], R_WE[:, 0], atol=1e-12)
+
+
+class Played:
+    """A snake task with a tube and an organ where they are told to be."""
+
+    def __init__(self) -> None:
+        self.dut = SnakeTask()
+        self.simulator = Simulator(self.dut)
+        self.context = self.simulator.get_mutable_context()
+        self.tube = np.array([0.0, 0.0, -0.08, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0])
+        self.organ = flat(example(OrganMotion))
+
+    def play(self, phase: Phases, seconds: float) -> tuple[SnakeStatus, ToolTarget]:
+        """Status and target after some more time in a phase."""
+        ports = {"phase": flat(Phase(float(phase), 0.0, 0.0, 1.0))}
+        ports |= {"tube": self.tube, "organ": self.organ}
+        for name, value in ports.items():
+            self.dut.GetInputPort(name).FixValue(self.context, value)
+        self.simulator.AdvanceTo(self.context.get_time() + seconds)
+        read = [
+            np.array(self.dut.GetOutputPort(name).Eval(self.context))
+            for name in ("status", "target")
+        ]
+        return view(SnakeStatus, read[0]), view(ToolTarget, read[1])
+
+
+def test_the_snake_stays_in_its_tube_but_for_the_gate():
+    played = Played()
+    for phase in (Phases.PROBE, Phases.APPROACH, Phases.STATION, Phases.STOPPED):
+        status, target = played.play(phase, 1.0)
+        assert status.out == 0.0
+        assert target.p[2] + SnakeParams().tool_radius < -0.04  # C: the tube's end
+
+
+def test_the_snake_makes_up_for_the_tube():
+    played = Played()
+    whole = played.dut.time / 2
+    status, before = played.play(Phases.RESECT, whole)
+    assert status.out == 1.0
+    played.organ[:3] += [0.002, -0.001, 0.003]
+    _, after = played.play(Phases.RESECT, 1e-9)
+    # C's z axis is the world's -z, its y axis the world's -y.
+    np.testing.assert_allclose(after.p - before.p, [0.002, 0.001, -0.003], atol=2e-4)
+
+
+def test_a_stop_draws_the_tool_back():
+    played = Played()
+    played.play(Phases.RESECT, played.dut.time / 2)
+    status, _ = played.play(Phases.STOPPED, 0.2)
+    assert status.retreat == 1.0
+    clock = status.clock
+    status, _ = played.play(Phases.STOPPED, 2.0)
+    assert status.clock == clock
+    status, _ = played.play(Phases.RETRACT, 40.0)
+    assert status.out == 0.0 and status.retreat == 0.0
+
+
+def test_the_tube_follows_its_station():
+    params = TubeTaskParams(standoff=0.05)
+    dut = TubeTask(params, p_WP=(0.0, 0.0, -0.06))
+    simulator = Simulator(dut)
+    context = simulator.get_mutable_context()
+    organ = example(OrganMotion)._replace(p=(0.003, 0.0, -0.12), v=(0.01, 0.0, 0.0))
+    dut.GetInputPort("organ").FixValue(context, flat(organ))
+    dut.GetInputPort("snake").FixValue(context, flat(example(SnakeStatus)))
+    for phase in (Phases.PROBE, Phases.APPROACH):
+        code = flat(Phase(float(phase), 0.0, 0.0, 1.0))
+        dut.GetInputPort("phase").FixValue(context, code)
+        simulator.AdvanceTo(context.get_time() + 3.0)
+        tool = view(ToolMotion, np.array(dut.GetOutputPort("tool").Eval(context)))
+        if phase == Phases.PROBE:
+            np.testing.assert_allclose(tool.tip, [0.0, 0.0, -0.06], atol=1e-12)
+    np.testing.assert_allclose(tool.tip, [0.003, 0.0, -0.07], atol=1e-9)
+    np.testing.assert_allclose(tool.v, [0.01, 0.0, 0.0], atol=1e-9)
+    status = view(TubeStatus, np.array(dut.GetOutputPort("status").Eval(context)))
+    assert status.distance < 1e-9
