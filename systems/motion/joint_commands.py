@@ -34,7 +34,7 @@ from systems.common.geometry import (
 )
 from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tool_state
-from systems.common.signal import Field, finiteness, flat, reader, size
+from systems.common.signal import Field, finiteness, flat, reader, size, view
 from systems.common.signals import FREE, Permission, Point, ToolMotion
 from systems.common.step_block import wired
 from systems.common.stops import Stop
@@ -418,7 +418,7 @@ class JointCommands(Block):
         def told(port: Any, instead: np.ndarray) -> np.ndarray:
             return port.Eval(context) if port.HasValue(context) else instead
 
-        fulcrum = told(self._fulcrum, tool[:3])
+        fulcrum = told(self._fulcrum, view(ToolMotion, tool).tip)
         measured = told(self._measured, np.concatenate([q, q]))
         permission = told(self._permission, _FREE)
         constants, arm = self._constants, self._arm
