@@ -43,8 +43,9 @@ def check_saved(meta: dict[str, Any], arrays: dict[str, Any]) -> None:
     sizes = [step["nodes"] for step in meta["steps"]]
     for what, holds in {
         "a label that there is not": (labels < len(NAMES)).all(),
-        "a tree without its root": nodes > 0 and visits > 0 and parent[0] == -1,
-        "a parent that comes later": ((parent >= 0) & (parent < order))[1:].all(),
+        "a tree without its root": nodes > 0 and visits > 0,
+        "a parent that comes later": ((parent >= -1) & (parent < order)).all(),
+        "a home that is no node": 0 <= meta["home"] < nodes,
         "a visit to no node": (
             (arrays["route"] >= 0) & (arrays["route"] < nodes)
         ).all(),
@@ -68,7 +69,8 @@ def check_removed(session: Any) -> None:
     volume, tips = session.volume, session.tips
     tau, fresh = volume.tau, volume.fresh().tau
     reach = session.params.tool_radius + volume.spacing
-    planned = (tau > 0) & (tau != SOLID)
+    bored = [channel.time for channel in volume.more]
+    planned = (tau > 0) & (tau != SOLID) & ~np.isin(tau, bored)
     points, times = volume.points(planned), tau[planned]
     a, b = tips[times - 1], tips[times]
     along = np.einsum("ij,ij->i", points - a, b - a)
