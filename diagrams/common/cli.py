@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
 import fnmatch
 import json
 import logging
@@ -18,6 +19,7 @@ examples:
   trocar scenarios                          what there is to run
   trocar run gauze_dynamic                  results in out/gauze_dynamic
   trocar run 'pwe_*' nav_crowd              several, one after the other
+  trocar live gauze_dynamic                 take part, in the browser
   trocar replay out/gauze_dynamic           opens the replay in the browser
   trocar compare out/gauze_static out/printed
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
@@ -73,6 +75,25 @@ def make_parser() -> argparse.ArgumentParser:
     compare.add_argument("other", metavar="DIR", type=Path, help="of another")
     compare.add_argument(
         "--out", metavar="FILE", type=Path, help="PNG; default: out/compare.png"
+    )
+    live = commands.add_parser(
+        "live",
+        help="run a gauze scenario in real time and take part in the browser",
+        description="Runs a gauze scenario in real time: the surgeon's tools follow "
+        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
+        "target; space: pause). What the hands did is kept as recordings, and run "
+        "again at the end for figures and replay.",
+    )
+    live.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")
+    live.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    live.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
+    live.add_argument("--duration", type=float, metavar="S", help="default: 600 s")
+    live.add_argument("--out", metavar="DIR", type=Path, help="default: out/live")
+    live.add_argument(
+        "--host", default="localhost", help="where it listens; '*' for everyone"
     )
     replay = commands.add_parser("replay", help="open a run's replay in the browser")
     replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
@@ -232,6 +253,32 @@ def compare_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def live_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar live`."""
+    import webbrowser
+
+    from diagrams.common.figures import table
+    from diagrams.common.replay import start_meshcat
+    from diagrams.common.run import run_scenario
+    from diagrams.live.session import Session
+    from diagrams.studies import load_scenario
+
+    if not 0.0 < arguments.speed <= 20.0:
+        raise ScenarioError(f"--speed {arguments.speed}: expected > 0 and <= 20")
+    scenario = load_scenario(arguments.name, arguments.overrides, arguments.seed)
+    out = arguments.out or Path("out") / "live"
+    meshcat = start_meshcat(arguments.host)
+    session = Session(scenario, meshcat)
+    print(f"{meshcat.web_url()}  (Ctrl-C ends it and keeps what was done)")
+    webbrowser.open(meshcat.web_url())
+    with suppress(KeyboardInterrupt):
+        session.play(arguments.duration or 600.0, arguments.speed)
+    run = run_scenario(session.save(out), out, progress=progress_bar)
+    print(table(run.metrics))
+    print(f"\n{out}/: trocar replay {out}, trocar run {out / 'scenario.yaml'}")
+    return 1 if run.error else 0
+
+
 def replay_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar replay`."""
     import webbrowser
@@ -317,6 +364,7 @@ COMMANDS = {
     "scenarios": list_scenarios,
     "run": run_command,
     "compare": compare_command,
+    "live": live_command,
     "replay": replay_command,
     "completion": completion_command,
     "diagram": diagram_command,
