@@ -9,10 +9,14 @@ import logging
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import ScenarioError, nearest, scenario_files
 from diagrams.common.tree import read_tree
+
+IMPORTED = ("jigsaws", "dvrk", "plus", "csv", "breathing", "crowd")
+"""Kinds of recordings that can be imported."""
 
 EXAMPLES = """\
 examples:
@@ -27,6 +31,7 @@ examples:
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
+  trocar import FILE --kind jigsaws         another's recording as one of ours
   trocar campaign operations --runs 200     many runs, and how sure that is
 """
 
@@ -132,6 +137,7 @@ def make_parser() -> argparse.ArgumentParser:
     resect.add_argument(
         "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
     )
+    add_import(commands)
     campaign = commands.add_parser(
         "campaign",
         help="run a scenario many times, varied, and say how sure the answer is",
@@ -156,6 +162,43 @@ def make_parser() -> argparse.ArgumentParser:
         help="a planner of one's own as a further variant of `crossing`",
     )
     return parser
+
+
+def add_import(commands: Any) -> None:
+    """Adds `trocar import` to a parser's commands."""
+    parser = commands.add_parser(
+        "import",
+        help="make the project's own file of another's recording",
+        description="Reads a recording, says what it holds, and writes a CSV (of a "
+        "crowd: a scenario). Nothing of it is kept elsewhere.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument("--kind", choices=IMPORTED, required=True)
+    parser.add_argument("--out", metavar="FILE", type=Path, help="default: out/STEM.*")
+    parser.add_argument(
+        "--place",
+        metavar="X,Y,Z",
+        default="0,0,-0.11",
+        help="of the motion's mean in W [m]",
+    )
+    parser.add_argument(
+        "--yaw", type=float, default=0.0, help="turn about the vertical [deg]"
+    )
+    parser.add_argument(
+        "--arm",
+        default="",
+        help="jigsaws: master_left ... slave_right; plus: its transform, e.g. "
+        "ProbeToTracker; breathing: the column",
+    )
+    parser.add_argument(
+        "--rate", type=float, default=100.0, help="breathing: samples a second"
+    )
+    parser.add_argument(
+        "--start", type=float, default=0.0, help="crowd: first second of it"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=40.0, help="crowd: how long [s]"
+    )
 
 
 def list_scenarios(arguments: argparse.Namespace) -> int:
@@ -360,6 +403,14 @@ def campaign_command(arguments: argparse.Namespace) -> int:
     return command.campaign_command(arguments)
 
 
+def import_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar import`."""
+    from diagrams.common.importing import import_file
+
+    import_file(arguments)
+    return 0
+
+
 COMMANDS = {
     "scenarios": list_scenarios,
     "run": run_command,
@@ -371,6 +422,7 @@ COMMANDS = {
     "keys": keys_command,
     "resect": resect_command,
     "campaign": campaign_command,
+    "import": import_command,
 }
 
 

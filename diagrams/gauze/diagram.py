@@ -39,7 +39,9 @@ WIRES = (
     ("target.estimate", "endoscope.target"),
     # Figure 2's feedback: where the robot's tool is.
     ("plant.pa10_state", "robot_location.arm_state"),
+    ("plant.pa10_state", "joint_commands.arm_state"),
     ("fulcrum.y0", "robot_location.fulcrum"),
+    ("fulcrum.y0", "joint_commands.fulcrum"),
     # Figure 4, the local planner: three behaviours and the fuzzy decision.
     ("robot_location.robot_tool", "go_to_target.robot_tool"),
     ("obstacles.estimates", "go_to_target.obstacles"),
@@ -106,6 +108,7 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
 
 TOLD = (
     ("fulcrum.y0", "robot_location.fulcrum"),
+    ("fulcrum.y0", "joint_commands.fulcrum"),
     ("tool_navigation.tool", "joint_commands.tool"),
 )
 """The wires that the passive wrist takes the place of."""
@@ -113,6 +116,7 @@ TOLD = (
 EMULATED = (
     *WRIST_WIRES,
     ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("tool_navigation.tool", "passive_wrist.tool_wanted"),
     ("passive_wrist.permission", "tool_navigation.permission"),
     ("passive_wrist.permission", "clearance_constraint.permission"),
@@ -275,4 +279,4 @@ def make_gauze_diagram(
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
     wires, exports = wiring(scenario, systems)
-    return finish(builder, "gauze_delivery", systems, wires, exports)
+    return finish(builder, "gauze_delivery", systems, wires, exports, scenario.faults)

@@ -43,6 +43,8 @@ KEYHOLE_WIRES = (
     *WRIST_WIRES,
     ("plant.pa10_state", "robot_location.arm_state"),
     ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("plant.pa10_state", "joint_commands.arm_state"),
+    ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("joint_commands.set_point", "plant.pa10_desired_state"),
     # The snake's weight shifts along the tube.
     ("snake_location.posture", "snake_load.posture"),
@@ -57,7 +59,7 @@ KEYHOLE_WIRES = (
     ("organ_estimator.motion", "phases.organ"),
     ("fulcrum_estimator.estimate", "phases.fulcrum"),
     ("tool_wrench.shaft", "phases.shaft"),
-    ("tool_wrench.wrench", "phases.wrench"),
+    ("wrench_watch.believed", "phases.wrench"),
     ("passive_wrist.permission", "phases.permission"),
     ("wire_watch.alarm", "phases.alarm"),
     # The tube follows the organ, through the passive wrist.
@@ -209,4 +211,4 @@ def make_keyhole_diagram(
     wires, exports = KEYHOLE_WIRES, EXPORTS
     if case.resection is not None:
         wires, exports = wires + CARVER_WIRES, exports | CARVER_EXPORTS
-    return finish(builder, "keyhole", systems, wires, exports)
+    return finish(builder, "keyhole", systems, wires, exports, s.faults)

@@ -10,7 +10,7 @@ import shlex
 
 from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import refusals
-from diagrams.resection.operation import finish_plan, new_session, reach_of
+from diagrams.resection.operation import finish_plan, new_session, reach_of, resumed
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.labels import TUMOUR
 from systems.resection.planning.feasibility_map import feasibility_map
@@ -24,7 +24,7 @@ from systems.resection.planning.procedure import (
     load_procedures,
     save_procedures,
 )
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.session import Session
 
 HELP = """\
 entry LENGTH RADIUS                  propose an entry procedure [mm]
@@ -172,9 +172,9 @@ def open_session(scenario: ResectionScenario, file: Path) -> Session:
         ScenarioError: If the file is damaged or the scenario makes no session.
     """
     with refusals():
-        if file.exists():
-            return load_session(file)
         session, _ = new_session(scenario)
+        if file.exists():
+            session = resumed(file, session)
     session.file = file
     session.save(file)
     return session

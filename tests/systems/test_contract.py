@@ -40,7 +40,7 @@ BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
-    "pwe_arc": [],
+    "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
     "snake_wire_break": [],
@@ -203,6 +203,7 @@ OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
     *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "ToolWrench"),
     *("TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
+    "WrenchWatch",
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}
