@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from plants.tissue.labels import BRAIN, CAP, CRITICAL
+from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL
 from plants.tissue.space import SOLID
 
 
@@ -33,11 +33,15 @@ def measure(run: Any) -> dict[str, Any]:
     error = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
     volume = session.volume.tumour_volume
     steps = session.steps
-    cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
+    cap, bored = (
+        int(np.count_nonzero(session.volume.labels == label)) * session.volume.voxel
+        for label in (CAP, CHANNEL)
+    )
     return {
         "tumour_volume": volume,
         "mask_volume": session.volume.mask_volume,
         "cap_volume": cap,
+        "channel_volume": bored,
         "reachable_fraction": reach.fraction,
         "planned_fraction": session.fraction,
         "resected_fraction": float(removed.tumour[-1]) / volume,

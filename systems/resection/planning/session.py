@@ -185,9 +185,9 @@ class Session:
         else:
             start = np.array(procedure.position, float)
         clearance = self.volume.channel - params.body_radius
-        refusal = check_jam(procedure, clearance, params) or check_reach(
-            procedure, start, params
-        )
+        refusal = check_jam(
+            procedure, clearance, params, self.clearance, self.accuracy
+        ) or check_reach(procedure, start, params)
         if refusal:
             return refusal
         n, s = procedure.axis(), self.volume.space()
