@@ -12,6 +12,7 @@ from systems.resection.planning.entry_law import (
     least_radius,
     opening_ratio,
 )
+from systems.resection.planning.feasibility import check_jam
 from systems.resection.planning.procedure import (
     Procedure,
     Tool,
@@ -31,6 +32,17 @@ def test_entry_law_has_the_paper_robot_numbers():
     assert least_clearance(thin) == pytest.approx(0.79e-3, abs=0.01e-3)
     assert least_radius(thin) == pytest.approx(5.7e-3, abs=0.05e-3)
     assert least_clearance(SnakeParams()) == 0.0
+    # With what the plan keeps: r_b = 4.1, r = 2.95 mm, and 0.1 mm beyond the body.
+    kept = least_clearance(thin, kept=0.1e-3, accuracy=0.05e-3)
+    assert kept == pytest.approx(0.1e-3 + 1.15e-3 / (31.2 / 13.8 - 1.0))
+
+
+def test_jam_counts_what_the_plan_keeps():
+    thin = SnakeParams(tool_offset=6e-3, tool_radius=3e-3)
+    assert check_jam(ENTRY, 0.85e-3, thin) is None  # bare, it opens out
+    answer = check_jam(ENTRY, 0.85e-3, thin, kept=0.075e-3, accuracy=0.025e-3)
+    assert answer.reason == "jam"
+    assert check_jam(ENTRY, 0.96e-3, thin, kept=0.075e-3, accuracy=0.025e-3) is None
 
 
 def test_check_changes_nothing_and_commit_does():
