@@ -33,6 +33,8 @@ from systems.sensing.organ_estimator import OrganEstimatorParams
 
 TASKS = ("circle", "resect")
 PERIOD = 1.0 / 120.0
+BASE = 2e-3
+"""How far the snake's base may stand within the tube at work, in m."""
 TURN = 120
 """Postures of a turn of the circle."""
 
@@ -173,7 +175,7 @@ class KeyholeScenario(Scenario, WristSettings):
     def planned(self) -> OrganOperation:
         """The resection with a snake whose base stays out of the tube."""
         snake = self.operation.snake
-        travel = [-self.instrument.gap, snake.travel[1]]
+        travel = [-self.instrument.gap - BASE, snake.travel[1]]
         player = replace(self.operation.player, lead=self.operation.period)
         return replace(
             self.operation,

@@ -87,10 +87,11 @@ class SnakeInOrgan(Block):
 
     def _calc_posture(self, context: Any) -> Floats:
         target = self._target.Eval(context)
-        x, status = tool_posture(target, self._snake)
-        if status == REACHED:
-            return np.array(x)
-        # Far outside the organ: straight, the tool at its depth.
+        if target[2] > -self._snake.tool_radius:
+            x, status = tool_posture(target, self._snake)
+            if status == REACHED:
+                return np.array(x)
+        # Before the organ nothing is touched: straight, the tool at its depth.
         return np.array([target[2] - self._length, *np.zeros(6)])
 
     def _calc_tool(self, context: Any) -> Floats:
