@@ -67,6 +67,8 @@ KEYHOLE_WIRES = (
     ("tube_task.tool", "passive_wrist.tool_wanted"),
     # The snake does the rest.
     ("plant.pa10_state", "tube_location.arm_state"),
+    ("joint_commands.posture", "tube_location.posture"),
+    ("joint_commands.next", "tube_location.next"),
     ("phases.phase", "snake_task.phase"),
     ("tube_location.tube", "snake_task.tube"),
     ("organ_estimator.ahead", "snake_task.organ"),
@@ -147,7 +149,7 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
         "phases": OperationPhases(s.phases),
         "tube_task": TubeTask(s.tube_task, s.robot.p_WP, s.entry.p_WE, s.axis.tolist()),
         "snake_task": task,
-        "tube_location": TubeLocation(tube_known, o.period),
+        "tube_location": TubeLocation(tube_known),
         "robot_location": RobotLocation(tube_known),
         "joint_commands": JointCommands(s.joints, posture.tolist(), s.arm, tube_known),
         "resection_ik": ResectionIk(

@@ -25,6 +25,7 @@ from systems.keyhole.phases import PhasesParams
 from systems.keyhole.snake_task import SnakeTaskParams
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
 from systems.resection.wires.wire_drums import WireDrumsParams
@@ -113,6 +114,15 @@ class OrganTracker(OpticalTrackerParams):
 
 
 @dataclass
+class SteadyFulcrum(FulcrumParams):
+    """For minutes under a tip that follows an organ."""
+
+    steady: bool = parameter(
+        True, "whether it is kept from drifting along the shaft, over minutes"
+    )
+
+
+@dataclass
 class Entry:
     """Where the organ is entered, the breath in its middle."""
 
@@ -126,14 +136,9 @@ class KeyholeScenario(Scenario, WristSettings):
     """One patient, one plant: tube and snake through the trocar of who breathes."""
 
     task: str = parameter("circle", "what the tool does in the organ", choices=TASKS)
-    known_organ: bool = parameter(
-        False, "whether the organ's motion is told, for comparison"
-    )
-    snake_follows: bool = parameter(
-        True, "whether the snake makes up for what the tube misses, for comparison"
-    )
     robot: ToolAtStart = part(ToolAtStart)
     entry: Entry = part(Entry)
+    fulcrum_estimator: SteadyFulcrum = part(SteadyFulcrum)
     organ_motion: OrganMotionParams = part(OrganMotionParams)
     organ_tracker: OrganTracker = part(OrganTracker)
     organ_estimator: OrganEstimatorParams = part(OrganEstimatorParams)

@@ -260,6 +260,8 @@ class JointCommands(Block):
 
     Port ``posture`` emits the commanded `Posture`.
 
+    Port ``next`` emits that of the next instant.
+
     Port ``status`` emits the `Status`.
     """
 
@@ -295,9 +297,17 @@ class JointCommands(Block):
         start = command(self._constants[0], nominal, np.zeros(JOINTS), weight, 0.0)
         for (name, signal), state in zip(signals.items(), start, strict=True):
             self.state_out(name, signal, flat(state))
-        self.update_every(params.period, self._update)
+        reads = {self.xd_ticket(), self.time_ticket(), self._tool.ticket()}
+        self._next = self.cached("next", self._calc_next, reads)
+        self.signal_out(
+            "next",
+            Posture,
+            lambda context: self._next.Eval(context)[0],
+            {self._next.ticket()},
+        )
+        self.update_every(params.period, self._next.Eval)
 
-    def _update(self, context: Any) -> Sequence[Any]:
+    def _calc_next(self, context: Any) -> Sequence[Any]:
         q = context.get_discrete_state(0).value()
         tool, time = self._tool.Eval(context), context.get_time()
         step = self._step(self._constants, self._arm, q, time, tool)

@@ -11,10 +11,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import across, along, dot, over, plus, scaled, sub, xyz
+from systems.common.geometry import (
+    across,
+    along,
+    dot,
+    norm,
+    over,
+    plus,
+    scaled,
+    sub,
+    xyz,
+)
 from systems.common.parameter import check
 from systems.common.signal import finiteness, reader, writer
 from systems.common.signals import Fulcrum, ShaftMotion, Wrench
+from systems.passive_wrist import steady as steadying
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_kernels import (
     LN_K,
@@ -30,6 +41,7 @@ from systems.passive_wrist.fulcrum_kernels import (
     update,
     write_entry,
 )
+from systems.passive_wrist.steady import leak, unbiased, unexplained
 
 Floats = np.ndarray
 
@@ -72,8 +84,9 @@ def constants(params: FulcrumParams) -> Floats:
     """
     check(params, "fulcrum_estimator")
     n = 5 + 6 * params.harmonics
-    lengths = (n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS), params.harmonics)
-    names = ("P", "record", "sums", "scalars", "rms", "end")
+    steady = steadying.SIZE if params.steady else 0
+    lengths = (n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS), params.harmonics, steady)
+    names = ("P", "record", "sums", "scalars", "rms", "steady_at", "end")
     places = dict(zip(names, np.cumsum(lengths).tolist(), strict=True))
     every = max(1, round(RECORD_PERIOD / params.period))
     return packed(params, n=n, every=float(every), **places)
@@ -89,6 +102,7 @@ class Memory(NamedTuple):
         sums: For its next entry, shape (13,).
         scalars: See `SCALARS`.
         rms: Of each harmonic, in m.
+        steady: Of `steady`, if the estimate is kept so.
     """
 
     x: Floats
@@ -97,6 +111,7 @@ class Memory(NamedTuple):
     sums: Floats
     scalars: Floats
     rms: Floats
+    steady: Floats
 
 
 @compiled
@@ -110,7 +125,8 @@ def memory(packed: Floats, z: Floats) -> Memory:
         z[c.record : c.sums].reshape((RECORD, WIDTH)),
         z[c.sums : c.scalars],
         z[c.scalars : c.rms],
-        z[c.rms :],
+        z[c.rms : c.steady_at],
+        z[c.steady_at :],
     )
 
 
@@ -229,7 +245,7 @@ def advance(
     c = packed[0]
     n = c.n
     z = old.copy()
-    x, P, record, sums, aux, rms = memory(packed, z)
+    x, P, record, sums, aux, rms, steady = memory(packed, z)
     shaft, wrench = read_shaft(shaft_now), read_wrench(wrench_now)
     parts = c.amplitude_walk * np.maximum(rms, LEAST_RMS)
     aux[TIME], aux[DUE] = time, 0.0
@@ -259,6 +275,14 @@ def advance(
         # angles are heard only while the depth is hardly known at all.
         sigma = spread(P, a.u, 0.0)[1]
         turning *= min(max(sigma / _DEPTH_UNKNOWN - 1.0, 0.0), 1.0)
+    if c.steady and known:
+        tip, v_tip = along(a.p, c.length, a.u), along(a.v, c.length, a.du)
+        rest = unexplained(steady, tip, v_tip, exp(x[LN_OMEGA]), c.period)
+        speed = norm(across(rest, a.u))
+        turning = min(max(speed / c.depth_speed - 1.0, 0.0), 1.0)
+        depth = dot(a.u, sub(xyz(x, 0), a.p))
+        f = unbiased(steady, a, depth, c.period)
+        a = Sample(a.p, a.u, a.v, a.du, f, a.m, a.damping, a.averaged, turning)
     seen = innovate(c, x, P, a)
     if seen.nis < 0.0:
         raise ValueError("fulcrum estimator: a covariance is not positive definite")
@@ -277,7 +301,10 @@ def advance(
         # its motion, and says less of its stiffness.
         least = c.learn_above * (_UNDERSTOOD if known else 1.0)
         held = 3 if guard else (n if force > least else n - 1)
-        update(x, P, seen, a.u, max(seen.seen, turning), held)
+        told = max(seen.seen, turning)
+        update(x, P, seen, a.u, told, held)
+        if c.steady and known:
+            leak(steady, x, P, a.u, xyz(c.guess, 0), told, c.period)
     sums += write_entry(entry_of(x, a, turning, seen.w))
     aux[SUMMED] += 1.0
     if aux[SUMMED] >= c.every:
@@ -290,6 +317,8 @@ def advance(
     for k in range(3, n - 2, 6):
         fulcrum = plus(fulcrum, xyz(x, k))
     away = sub(fulcrum, c.guess)
+    if c.steady and known:
+        away = across(away, a.u)
     if dot(away, away) > c.neighbourhood**2:  # refused: starts anew
         aux[REFUSED] += 1.0
         aux[PHASE] = FOLLOWING
