@@ -66,7 +66,28 @@ def load_scenario(
         ScenarioError: For anything that can be known to be wrong beforehand.
     """
     path = find_scenario(name)
-    tree = read_tree(path)
+    return scenario_of(read_tree(path), overrides, seed, duration, path)
+
+
+def scenario_of(
+    tree: dict[str, Any],
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    duration: float | None = None,
+    path: Path = Path("scenario"),
+) -> Any:
+    """The checked scenario of plain data, which is changed in place.
+
+    Args:
+        tree: Plain data, as `read_tree` gives them.
+        overrides: As for `load_scenario`, as are seed and duration.
+        seed: Replaces the scenario's seed.
+        duration: Replaces the scenario's duration [s].
+        path: Where the data came from: relative names of files begin beside it.
+
+    Raises:
+        ScenarioError: For anything that can be known to be wrong beforehand.
+    """
     if "system" not in tree:
         raise ScenarioError(f"{path}: missing key 'system', e.g. 'system: gauze'")
     study = get_study(tree["system"])

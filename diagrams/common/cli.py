@@ -2,23 +2,30 @@
 
 import argparse
 from collections.abc import Sequence
+import fnmatch
+import json
 import logging
+import os
 from pathlib import Path
 import sys
 
 from diagrams.common.progress import progress_bar
-from diagrams.common.scenario import ScenarioError, scenario_files
+from diagrams.common.scenario import ScenarioError, nearest, scenario_files
 from diagrams.common.tree import read_tree
 
 EXAMPLES = """\
 examples:
   trocar scenarios                          what there is to run
   trocar run gauze_dynamic                  results in out/gauze_dynamic
+  trocar run 'pwe_*' nav_crowd              several, one after the other
+  trocar replay out/gauze_dynamic           opens the replay in the browser
+  trocar compare out/gauze_static out/printed
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
+  trocar campaign operations --runs 200     many runs, and how sure that is
 """
 
 
@@ -30,6 +37,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action=Version, nargs=0, help="version and commit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("scenarios", help="list the scenarios, one line each")
     run = commands.add_parser(
@@ -38,8 +46,13 @@ def make_parser() -> argparse.ArgumentParser:
         description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
         "PNG, replay.html and scenario.yaml (exactly what ran) into DIR.",
     )
-    run.add_argument("name", metavar="NAME", help="a scenario's name or its file")
-    run.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
+    run.add_argument(
+        "names", metavar="NAME", nargs="+", help="a scenario's name, pattern or file"
+    )
+    run.add_argument(
+        "--out", metavar="DIR", type=Path, help="default: out/NAME; of several DIR/NAME"
+    )
+    run.add_argument("--json", action="store_true", help="print the figures as JSON")
     run.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
     run.add_argument(
         "--set",
@@ -53,6 +66,23 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--no-replay", action="store_true", help="do not record replay.html"
     )
+    compare = commands.add_parser(
+        "compare", help="two runs side by side: figures, and signals over each other"
+    )
+    compare.add_argument("one", metavar="DIR", type=Path, help="results of a run")
+    compare.add_argument("other", metavar="DIR", type=Path, help="of another")
+    compare.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/compare.png"
+    )
+    replay = commands.add_parser("replay", help="open a run's replay in the browser")
+    replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
+    shell = commands.add_parser(
+        "completion",
+        help="print a shell's completion script",
+        description="Prints a completion script: "
+        "trocar completion bash > ~/.local/share/bash-completion/completions/trocar",
+    )
+    shell.add_argument("shell", choices=("bash", "zsh", "tcsh"))
     draw = commands.add_parser("diagram", help="draw a scenario's block diagram")
     draw.add_argument("name", metavar="NAME", help="a scenario's name or its file")
     draw.add_argument(
@@ -81,6 +111,29 @@ def make_parser() -> argparse.ArgumentParser:
     resect.add_argument(
         "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
     )
+    campaign = commands.add_parser(
+        "campaign",
+        help="run a scenario many times, varied, and say how sure the answer is",
+        description="Runs a campaign; started again with the same DIR it goes on. "
+        "Writes runs/ (Parquet), report.html, summary.json and the worst runs as "
+        "scenarios. Needs the extra `campaigns`.",
+    )
+    campaign.add_argument("name", metavar="NAME", help="a campaign's name or its file")
+    campaign.add_argument("--runs", type=int, metavar="N", help="of each variant")
+    campaign.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one a core"
+    )
+    campaign.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
+    )
+    campaign.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
+    campaign.add_argument("--seed", type=int, metavar="N", help="of the draws")
+    campaign.add_argument(
+        "--planner",
+        metavar="MODULE:CLASS",
+        default="",
+        help="a planner of one's own as a further variant of `crossing`",
+    )
     return parser
 
 
@@ -101,20 +154,58 @@ def default_name(name: str) -> str:
     return path.stem
 
 
+def find_names(patterns: Sequence[str]) -> list[str]:
+    """Names and files as they are; a pattern becomes the names that match it.
+
+    Raises:
+        ScenarioError: If a pattern matches none.
+    """
+    names: list[str] = []
+    for pattern in patterns:
+        is_pattern = set("*?[") & set(pattern) and not Path(pattern).exists()
+        found = fnmatch.filter(scenario_files(), pattern) if is_pattern else [pattern]
+        if not found:
+            raise ScenarioError(
+                f"no scenario matches {pattern!r}: {nearest(pattern, scenario_files())}"
+            )
+        names += [name for name in found if name not in names]
+    return names
+
+
 def run_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar run`."""
-    from diagrams.common.metrics import table
+    names = find_names(arguments.names)
+    codes = []
+    for name in names:
+        out = arguments.out or Path("out")
+        if len(names) > 1 or not arguments.out:
+            out /= default_name(name)
+        if len(names) > 1 and not arguments.json:
+            print(f"\n{name}")
+        codes.append(run_one(arguments, name, out))
+    return max(codes)
+
+
+def run_one(arguments: argparse.Namespace, name: str, out: Path) -> int:
+    """Runs a scenario and prints its figures."""
+    from diagrams.common.figures import table
     from diagrams.common.run import run_scenario
     from diagrams.studies import load_scenario
 
     scenario = load_scenario(
-        arguments.name, arguments.overrides, arguments.seed, arguments.duration
+        name, arguments.overrides, arguments.seed, arguments.duration
     )
-    out = arguments.out or Path("out") / default_name(arguments.name)
     run = run_scenario(scenario, out, not arguments.no_replay, progress_bar)
-    if run.metrics:
-        print(table(run.metrics))
-    print(f"\n{', '.join(sorted(path.name for path in out.glob('[!.]*.*')))}: {out}/")
+    if arguments.json:
+        print(json.dumps(run.metrics, indent=2))
+    else:
+        if run.metrics:
+            print(table(run.metrics))
+        print(
+            f"\n{', '.join(sorted(path.name for path in out.glob('[!.]*.*')))}: {out}/"
+        )
+        if sys.stdout.isatty():
+            print(f"Look at {out / 'report.html'}, or: trocar replay {out}")
     if run.error:
         end = f"ended early at {run.simulated:.3f} s"
         print(
@@ -123,6 +214,55 @@ def run_command(arguments: argparse.Namespace) -> int:
         )
         return 1
     return 0
+
+
+def compare_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar compare`."""
+    from diagrams.common.compare import overlay, read, table
+    from diagrams.common.plots import save_figure
+
+    folders = (arguments.one, arguments.other)
+    (one, first), (other, second) = map(read, folders)
+    names = (str(arguments.one), str(arguments.other))
+    print(table(one, other, names))
+    out = arguments.out or Path("out") / "compare.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(overlay(first, second, names), out)
+    print(out)
+    return 0
+
+
+def replay_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar replay`."""
+    import webbrowser
+
+    page = arguments.folder / "replay.html"
+    if not page.is_file():
+        raise ScenarioError(
+            f"{str(page)!r}: no such file; `trocar run` writes it without --no-replay"
+        )
+    webbrowser.open(page.resolve().as_uri())
+    print(page)
+    return 0
+
+
+def completion_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar completion`."""
+    import shtab
+
+    print(shtab.complete(make_parser(), arguments.shell))
+    return 0
+
+
+class Version(argparse.Action):
+    """Prints the version and the commit, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *more: object) -> None:
+        """Called for `--version`."""
+        from diagrams.common.provenance import commit, release
+
+        print(" ".join(filter(None, ["trocar", release(), commit()])))
+        parser.exit()
 
 
 def diagram_command(arguments: argparse.Namespace) -> int:
@@ -161,12 +301,28 @@ def resect_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def campaign_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar campaign`."""
+    try:
+        from diagrams.campaigns import command
+    except ModuleNotFoundError as error:
+        raise ScenarioError(
+            f"no module {error.name!r}: campaigns need the extra, "
+            "pip install 'trocar[campaigns]'"
+        ) from error
+    return command.campaign_command(arguments)
+
+
 COMMANDS = {
     "scenarios": list_scenarios,
     "run": run_command,
+    "compare": compare_command,
+    "replay": replay_command,
+    "completion": completion_command,
     "diagram": diagram_command,
     "keys": keys_command,
     "resect": resect_command,
+    "campaign": campaign_command,
 }
 
 
@@ -184,6 +340,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # `trocar keys ... | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except Exception as error:
         if sys.flags.dev_mode:  # `python -X dev -m diagrams` shows where
             raise

@@ -1,0 +1,1 @@
+"""Campaigns: a scenario varied and run thousands of times, and how sure that is."""
