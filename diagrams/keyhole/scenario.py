@@ -8,17 +8,21 @@ import numpy as np
 from diagrams.bedside.bedside import ToolAtStart
 from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
+from diagrams.gauze.tools import CAMERA
 from diagrams.resection.scenario import ResectionScenario
 from diagrams.resection.scenario import check as check_resection
 from plants.abdomen.abdomen import AbdomenParams
 from plants.abdomen.organ_motion import OrganMotionParams
 from plants.arm.arm import ArmParams
+from plants.instruments.instrument import InstrumentParams
 from plants.instruments.tube import TubeParams
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.parameters import SnakeParams
 from plants.snake.reachability import why_not
 from plants.surgeon.recording import load_recording
 from plants.tissue.volume import Access
+from systems.bypass.obstacle_tools import Margins
 from systems.common.parameter import Rules, parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
@@ -123,6 +127,32 @@ class SteadyFulcrum(FulcrumParams):
 
 
 @dataclass
+class WideMargins(Margins):
+    """A tube of 10 mm needs 2.5 mm more than an instrument of 5."""
+
+    safe_distance: float = parameter(
+        0.0095, "D_safe, that is held", "m", least=0.005, most=0.03
+    )
+    plan_distance: float = parameter(
+        0.012, "D, that ways are planned with", "m", least=0.005, most=0.05
+    )
+    camera_distance: float = parameter(
+        0.012, "D_safe of the endoscope", "m", least=0.0075, most=0.05
+    )
+    avoid_target: bool = parameter(False, "the station has no shaft to be avoided")
+
+
+@dataclass
+class Theatre(GauzeScenario):
+    """The surgeon's tools, and the local planner that leads round them.
+
+    The station takes the place of the target; the tool called target is withdrawn.
+    """
+
+    margins: WideMargins = part(WideMargins)
+
+
+@dataclass
 class Entry:
     """Where the organ is entered, the breath in its middle."""
 
@@ -136,6 +166,10 @@ class KeyholeScenario(Scenario, WristSettings):
     """One patient, one plant: tube and snake through the trocar of who breathes."""
 
     task: str = parameter("circle", "what the tool does in the organ", choices=TASKS)
+    others: bool = parameter(
+        False, "whether the surgeon's tools are there, and are planned round"
+    )
+    theatre: Theatre = part(Theatre)
     robot: ToolAtStart = part(ToolAtStart)
     entry: Entry = part(Entry)
     fulcrum_estimator: SteadyFulcrum = part(SteadyFulcrum)
@@ -190,6 +224,22 @@ class KeyholeScenario(Scenario, WristSettings):
         )
 
     @property
+    def surgeon(self) -> Theatre:
+        """The theatre with the robot and the patient of this scenario."""
+        return replace(
+            self.theatre,
+            seed=self.seed,
+            duration=self.duration,
+            wrist="pwe",
+            robot=self.robot,
+            instrument=InstrumentParams(length=self.instrument.length),
+            tools=[
+                replace(tool, p_WS=self.entry.p_WE) if tool.role == CAMERA else tool
+                for tool in self.theatre.tools
+            ],
+        )
+
+    @property
     def in_tube(self) -> SnakeParams:
         """The snake with the stroke that it has in its tube."""
         snake = self.operation.snake
@@ -224,6 +274,9 @@ def check(scenario: KeyholeScenario) -> None:
     _check_reach(scenario)
     if scenario.task == "circle":
         circle_postures(scenario)
+    if scenario.others:
+        check_tools(scenario.surgeon)
+        check_fulcrums(scenario.surgeon)
     if scenario.organ_motion.recording:
         load_recording(scenario.organ_motion.recording)
 
