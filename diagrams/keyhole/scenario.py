@@ -9,7 +9,7 @@ from diagrams.bedside.bedside import ToolAtStart
 from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
-from diagrams.gauze.tools import CAMERA
+from diagrams.gauze.tools import CameraTool
 from diagrams.resection.scenario import ResectionScenario
 from diagrams.resection.scenario import check as check_resection
 from plants.abdomen.abdomen import AbdomenParams
@@ -234,7 +234,9 @@ class KeyholeScenario(Scenario, WristSettings):
             robot=self.robot,
             instrument=InstrumentParams(length=self.instrument.length),
             tools=[
-                replace(tool, p_WS=self.entry.p_WE) if tool.role == CAMERA else tool
+                replace(tool, p_WS=self.entry.p_WE)
+                if isinstance(tool, CameraTool)
+                else tool
                 for tool in self.theatre.tools
             ],
         )

@@ -57,7 +57,7 @@ TISSUE = {
 
 def signals(scenario: KeyholeScenario) -> dict[str, Any]:
     """What is logged: tissue only where there is some."""
-    found = SIGNALS | (TISSUE if scenario.task == "resect" else {})
+    found: dict[str, Any] = SIGNALS | (TISSUE if scenario.task == "resect" else {})
     if scenario.others:
         near = in_the_way(scenario.theatre.tools)
         columns = tuple(column(name, role, near) for name, role in near)
