@@ -103,6 +103,8 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
     assert importers(arrows, "diagrams.common.run") == {
         "diagrams.campaigns.acts",  # what a run of a campaign does
         "diagrams.common.cli",
+        "diagrams.learning.baselines",
+        "diagrams.learning.environments",
     }
     assert importers(arrows, "diagrams.studies") == {
         "diagrams.campaigns.acts",
@@ -110,6 +112,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.campaigns.report",
         "diagrams.common.cli",
         "diagrams.common.run",
+        "diagrams.learning.environments",
     }
     planning = "systems.resection.planning"
     assert importers(

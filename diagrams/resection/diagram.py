@@ -31,6 +31,7 @@ RESECTION_WIRES = (
     *DRUM_WIRES,
     # What the tool's true path removes.
     ("snake_location.posture", "tissue_carver.posture"),
+    ("procedure_player.entry", "tissue_carver.entry"),
 )
 
 EXPORTS = {
@@ -58,7 +59,12 @@ def make_blocks(case: Operation) -> dict[str, Any]:
     lengths = wound_lengths(start, winding, s.snake, s.drive)
     return {
         "procedure_player": ProcedurePlayer(
-            replace(s.player, lead=s.period), s.snake, postures, done.posture
+            replace(s.player, lead=s.period),
+            s.snake,
+            postures,
+            done.posture,
+            case.waits,
+            case.session.entries,
         ),
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, start

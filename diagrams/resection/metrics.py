@@ -3,10 +3,13 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from plants.tissue.labels import BRAIN, CAP, CRITICAL
 from plants.tissue.space import SOLID
+from systems.resection.planning.next_entry import bored_healthy
+from systems.resection.planning.session import STROKES, Session
 
 
 def carving_of(run: Any) -> Any:
@@ -18,11 +21,29 @@ def carving_of(run: Any) -> Any:
 def outside_depth(volume: Any) -> float:
     """How deep into healthy tissue anything was removed, outside the channel, in m."""
     wrong = (volume.tau != SOLID) & np.isin(volume.labels, (BRAIN, CRITICAL))
+    for channel in volume.more:
+        wrong &= ~volume.tube(channel)
     if not wrong.any():
         return 0.0
     healthy = np.isin(volume.labels, (BRAIN, CRITICAL))
     depth = ndimage.distance_transform_edt(healthy)
     return float(depth[wrong].max() * volume.spacing)
+
+
+def freeing_runs(session: Session) -> list[NDArray]:
+    """Stretches of a plan in which every move frees tumour: how much each, in m3."""
+    volume = session.volume
+    gone = volume.tau[volume.resected & (volume.tau > 0)]
+    gains = np.bincount(gone, minlength=int(session.tree.size[1])) * volume.voxel
+    ends = np.flatnonzero(np.diff((gains > 0.0).astype(int), prepend=0, append=0))
+    return [gains[first:last] for first, last in ends.reshape(-1, 2)]
+
+
+def single_step_share(runs: list[NDArray]) -> float:
+    """Of what a plan removes, what single moves do between others that free nothing."""
+    whole = sum(float(run.sum()) for run in runs)
+    single = sum(float(run[0]) for run in runs if len(run) == 1)
+    return single / whole if whole > 0.0 else 0.0
 
 
 def measure(run: Any) -> dict[str, Any]:
@@ -32,7 +53,7 @@ def measure(run: Any) -> dict[str, Any]:
     nearest = float(touched.critical_distance[-1])
     error = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
     volume = session.volume.tumour_volume
-    steps = session.steps
+    steps, runs = session.steps, freeing_runs(session)
     cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
     return {
         "tumour_volume": volume,
@@ -43,10 +64,13 @@ def measure(run: Any) -> dict[str, Any]:
         "resected_fraction": float(removed.tumour[-1]) / volume,
         "healthy_removed": float(removed.healthy[-1]),
         "max_outside_depth": outside_depth(carving_of(run).volume),
+        "entries": 1 + len(session.volume.more),
+        "bored_healthy": bored_healthy(session.volume),
         "min_critical_distance": nearest if nearest >= 0.0 else None,
         "body_collisions": int(touched.hits[-1]),
-        "procedures": sum(step.kind not in ("home", "finish") for step in steps),
-        "finishes": sum(step.kind == "finish" for step in steps),
+        "procedures": sum(step.kind not in ("home", STROKES) for step in steps),
+        "strokes": len(runs),
+        "single_step_share": single_step_share(runs),
         "planning_time": run.case.planning_time,
         "reach_time": reach.time,
         "execution_time": run.case.done.time + run.simulated,

@@ -7,19 +7,30 @@ import sys
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from diagrams.common.case import Case
 from diagrams.common.progress import Progress
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.execution import Execution, load_execution
+from plants.tissue.labels import TUMOUR
 from plants.tissue.mask import load_mask
 from plants.tissue.space import NEIGHBOUR
 from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
 from plants.tissue.volume import Access, make_volume
 from systems.common.archive import beside
 from systems.resection.planning.access import propose_access
+from systems.resection.planning.next_entry import next_entries
 from systems.resection.planning.planner import Planner
-from systems.resection.planning.reach import Reach, find_reach, load_reach, save_reach
+from systems.resection.planning.reach import (
+    Lump,
+    Reach,
+    find_reach,
+    load_reach,
+    save_reach,
+)
 from systems.resection.planning.session import Session, load_session
 from systems.resection.wires.procedure_player import schedule
 
@@ -46,6 +57,14 @@ class Operation(Case):
     refusals: list[dict[str, Any]] = field(default_factory=list)
     planning_time: float = 0.0
     done: Execution = field(default_factory=Execution)
+
+    @property
+    def waits(self) -> NDArray[np.float64]:
+        """Time spent at each posture of the plan, in s, (n,)."""
+        waits = np.zeros(len(self.session.postures))
+        for channel in self.session.volume.more:
+            waits[channel.time - 1] = self.scenario.entries.time
+        return waits
 
 
 def tissue_of(scenario: ResectionScenario) -> Tissue:
@@ -119,7 +138,7 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
                 }
             )
     if scenario.automatic:
-        finish_plan(session, reach, scenario, progress)
+        reach = finish_plan(session, reach, scenario, progress)
     elif session.steps and session.steps[-1].kind != "home":
         session.go_home()
     planning_time = perf_counter() - start
@@ -157,15 +176,68 @@ def reach_of(
 
 def finish_plan(
     session: Session, reach: Reach, scenario: ResectionScenario, progress: Progress
+) -> Reach:
+    """Lets the planner do what is left, through as many entries as it may use.
+
+    Args:
+        session: The session; it may be in any of its entries.
+        reach: What can be reached through the first one.
+        scenario: The planner's parameters, and those of further entries.
+        progress: Shows how far it is.
+
+    Returns:
+        What can be reached through all entries that are used.
+    """
+    params, mask, taken = scenario.entries, reach.mask, reach.time
+    while True:
+        if session.volume.more:
+            what = f"what entry {1 + len(session.volume.more)} can reach"
+            with progress(what, "of the tumour") as show:
+                reach = find_reach(
+                    session,
+                    scenario.seed,
+                    scenario.reach_effort,
+                    progress=lambda share: show(share, 1.0),
+                    anew=False,
+                )
+            taken += reach.time
+        run_planner(session, reach, scenario, progress)
+        mask = mask | reach.mask | session.volume.resected
+        if 1 + len(session.volume.more) >= params.most:
+            break
+        with progress("a further entry", "of those tried") as show:
+            found = next_entries(
+                session, params, scenario.seed, lambda share: show(share, 1.0)
+            )
+        if not found:
+            break
+        print(
+            f"trocar: a further entry: {found[0].text(session.volume)}", file=sys.stderr
+        )
+        session.enter_anew(found[0].X_WE)
+    fraction = int(mask.sum()) / int((session.volume.labels == TUMOUR).sum())
+    lumps = [lump for lump in reach.lumps if not _gone(session, lump)]
+    return replace(reach, mask=mask, fraction=fraction, time=taken, lumps=lumps)
+
+
+def _gone(session: Session, lump: Lump) -> bool:
+    """Whether what lies at a part's middle has been removed meanwhile."""
+    volume = session.volume
+    return bool(volume.resected[volume.index_of(np.array(lump.where))])
+
+
+def run_planner(
+    session: Session, reach: Reach, scenario: ResectionScenario, progress: Progress
 ) -> None:
-    """Lets the planner do what is left."""
+    """Lets the planner do what can be reached through the entry that is open."""
     target = scenario.planner.target
     with progress("planning", "of what can be reached") as show:
         planner = Planner(
             session,
-            reach.mask,
+            reach,
             scenario.planner,
             lambda share: show(min(share, target), target),
+            replace(scenario.player, lead=scenario.period),
         )
         planner.run()
 
@@ -173,6 +245,7 @@ def finish_plan(
 def length(case: Operation) -> float:
     """How long the run takes in s."""
     player = replace(case.scenario.player, lead=case.scenario.period)
-    times = schedule(case.session.postures[case.done.posture :], player)
+    first = case.done.posture
+    times = schedule(case.session.postures[first:], player, case.waits[first:])
     needed = float(times[-1]) + player.dwell
     return min(case.scenario.duration, math.ceil(needed / LOG_PERIOD) * LOG_PERIOD)

@@ -12,23 +12,24 @@ from diagrams.resection.replay import coarse, shown_spacing
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
+from systems.resection.planning.session import STROKES
 
 MM = 1e3
-STEP_COLORS = ("#222222", "#c8402f", "#e5b80b", "#1f5fa8", "#2a8f4f", "#8e5bb0")
+STEP_COLORS = ("#222222", "#c8402f", "#e5b80b", "#2a8f4f", "#8e5bb0")
 CUT = ListedColormap(["#f4f1ee", "#e8b56a", "#ffffff", "#dbe7f3", "#b01820", "#c060c0"])
 """Brain, tumour, removed, channel and cap, critical, healthy tissue removed."""
 
 
-FINISH_COLOR = "#9aa3ad"
-"""Of the finisher's single steps."""
+STROKE_COLOR = "#1f5fa8"
+"""Of strokes."""
 
 
 def step_colors(steps: list[Any]) -> list[str]:
-    """Colours of a plan's steps: procedures in turn, single steps all alike."""
+    """Colours of a plan's steps: procedures in turn, strokes all alike."""
     colors, number = [], 0
     for step in steps:
-        if step.kind == "finish":
-            colors.append(FINISH_COLOR)
+        if step.kind == STROKES:
+            colors.append(STROKE_COLOR)
         else:
             colors.append(STEP_COLORS[number % len(STEP_COLORS)])
             number += 1
@@ -61,14 +62,14 @@ def figure8(run: Any) -> Figure:
     _mesh(left, volume.labels == TUMOUR, volume, "#c9c2ba", 0.12)
     tips = session.tips * MM
     chosen = [step for step in session.steps if step.kind != "home"]
-    labelled = [step.name for step in chosen if step.kind != "finish"][:8]
+    labelled = [step.name for step in chosen if step.kind != STROKES][:8]
     for step, color in zip(chosen, step_colors(chosen), strict=True):
         path = tips[max(step.first - 1, 0) : step.last]
         label = step.name if step.name in labelled else None
-        if step.name == "finish 1":
-            label = "single steps"
-        single = step.kind == "finish"  # there are many: behind the others
-        look = {"lw": 0.3, "zorder": 2} if single else {"lw": 0.6, "zorder": 3}
+        strokes = step.kind == STROKES  # there are many: behind the others
+        if step.name == "strokes 1":
+            label = "strokes"
+        look = {"lw": 0.5, "zorder": 2} if strokes else {"lw": 0.6, "zorder": 3}
         left.plot(*path.T, color=color, label=label, **look)
     _equal(left, volume)
     if chosen:
@@ -194,7 +195,8 @@ def _figures(m: dict[str, Any]) -> str:
         if critical is None
         else f"nearest to what is critical {1e3 * critical:.2f} mm",
         f"body in tissue at {m['body_collisions']} checks",
-        f"{m['procedures']} procedures, then single steps in {m['finishes']} rounds",
+        f"{m['procedures']} procedures, {m['strokes']} strokes; single steps "
+        f"{100 * m['single_step_share']:.1f} %",
         f"planned in {m['planning_time']:.1f} s, reach in {m['reach_time']:.1f} s",
         f"carried out in {m['execution_time'] / 60:.1f} min, tool path "
         f"{m['path_length']:.1f} m",

@@ -71,8 +71,16 @@ def corners(x: Any, h: float, tool: float, out: Any) -> tuple[Vector, Vector, Ve
     Returns:
         The axes x, y, z of T in W.
     """
-    p = (0.0, 0.0, x[0])
     e, f, n = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    return chain(x, h, tool, (0.0, 0.0, 0.0), e, f, n, out)
+
+
+@compiled
+def chain(
+    x: Any, h: float, tool: float, o: Any, e: Any, f: Any, n: Any, out: Any
+) -> tuple[Vector, Vector, Vector]:
+    """As `corners`, from a frame with origin o and axes e, f, n."""
+    p = along(o, x[0], n)
     for k in range(3):
         ca, sa = math.cos(x[1 + 2 * k]), math.sin(x[1 + 2 * k])
         cb, sb = math.cos(x[2 + 2 * k]), math.sin(x[2 + 2 * k])

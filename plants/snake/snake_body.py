@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.kinematics import POINTS, corners
+from plants.snake.kinematics import POINTS, chain
 from plants.snake.parameters import SnakeParams
 from plants.tissue.space import (
     FREE,
+    NEIGHBOUR,
     Space,
     body_solid,
     first_forbidden,
@@ -23,9 +24,11 @@ from plants.tissue.space import (
     plate_solid,
     roll_back,
     stamp,
+    voxel_of,
 )
 from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import along, dot, sub
+from systems.common.geometry import Vector, along, dot, sub
+from systems.common.signal import vector
 
 OK = 0
 BODY = 1  # some part of the body meets tissue
@@ -66,6 +69,10 @@ class Body(NamedTuple):
         high: Largest translation.
         shank: Radius of the tool's shank.
         step: Longest stretch of the body's motion between two checks.
+        o: Origin of the entry's frame E in the frame of the tissue, W.
+        e: Its axis x in W.
+        f: Its axis y.
+        n: Its axis z, along the channel.
     """
 
     h: float
@@ -79,6 +86,10 @@ class Body(NamedTuple):
     high: float
     shank: float
     step: float
+    o: Vector
+    e: Vector
+    f: Vector
+    n: Vector
 
 
 def body_of(
@@ -86,6 +97,7 @@ def body_of(
     clearance: float = 0.0,
     accuracy: float = 0.0,
     step: float = 0.5e-3,
+    X_WE: Any = None,
 ) -> Body:
     """The robot's numbers.
 
@@ -94,7 +106,9 @@ def body_of(
         clearance: By which its body is taken for wider, in m.
         accuracy: By which its tool is taken for smaller where it frees space, in m.
         step: Longest stretch of motion between two checks, in m.
+        X_WE: Pose of the entry's frame, (4, 4); that of W if None.
     """
+    X = np.eye(4) if X_WE is None else np.asarray(X_WE, float)
     return Body(
         params.half_pitch,
         params.tool_offset,
@@ -107,7 +121,29 @@ def body_of(
         params.travel[1],
         SHANK_RADIUS + clearance,
         step,
+        vector(X[:3, 3]),
+        vector(X[:3, 0]),
+        vector(X[:3, 1]),
+        vector(X[:3, 2]),
     )
+
+
+@compiled
+def place(b: Body, x: Any, out: Any) -> None:
+    """The corners of a posture (7,) in W, as `kinematics.corners`, into out (8, 3)."""
+    chain(x, b.h, b.tool, b.o, b.e, b.f, b.n, out)
+
+
+@compiled
+def from_entry(b: Body, p: Numbers) -> Vector:
+    """A point of W in the entry's frame E."""
+    return axis_from_entry(b, sub(p, b.o))
+
+
+@compiled
+def axis_from_entry(b: Body, n: Numbers) -> Vector:
+    """A direction of W in the entry's frame E."""
+    return dot(n, b.e), dot(n, b.f), dot(n, b.n)
 
 
 @compiled
@@ -121,9 +157,9 @@ def _blame(why: Any, part: int, p: Numbers, rho: float, at: int) -> int:
 def check_links(s: Space, b: Body, c: Any, first: int, why: Any) -> int:
     """OK or BODY for the round body up to the last ball; as `check_body`."""
     if first == 0:
-        z = c[0, 2] - b.h / 2
+        z = dot(sub(c[0], b.o), b.n) - b.h / 2
         while z > -b.body:
-            p = (0.0, 0.0, z)
+            p = along(b.o, z, b.n)
             at = body_solid(s, p, b.body)
             if at != FREE:
                 return _blame(why, 0, p, b.body, at)
@@ -203,6 +239,47 @@ def between(x0: Any, x1: Any, share: float, out: Any) -> None:
 
 
 @compiled
+def could_fit(s: Space, b: Body, c: Any) -> bool:
+    """Whether a body with corners c (8, 3) lies in what may ever be free.
+
+    Quick and not strict: where it says no, `check_body` never finds it free.
+    """
+    least = b.body / s.spacing - 2 * NEIGHBOUR
+    for link in range(5):
+        for n in range(4):
+            at = voxel_of(s, along(c[link], n / 4, sub(c[link + 1], c[link])))
+            if at >= 0 and s.inside[at] < least:
+                return False
+    at = voxel_of(s, c[5])
+    return at < 0 or s.inside[at] >= least
+
+
+@compiled
+def as_far_as_fits(s: Space, b: Body, x0: Any, x1: Any) -> bool:
+    """Shortens the way from x0 to x1, in place, to where the body could ever be.
+
+    Returns:
+        Whether a tenth of it is left.
+    """
+    c, x = np.empty((POINTS, 3)), np.empty(7)
+    place(b, x1, c)
+    if could_fit(s, b, c):
+        return True
+    low, high = 0.0, 1.0
+    for _ in range(5):
+        share = (low + high) / 2
+        between(x0, x1, share, x)
+        place(b, x, c)
+        if could_fit(s, b, c):
+            low = share
+        else:
+            high = share
+    between(x0, x1, low, x)
+    x1[:] = x
+    return low >= 0.1
+
+
+@compiled
 def drive(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> int:
     """Moves from a posture that fits to another, freeing what the tool sweeps.
 
@@ -239,8 +316,8 @@ def drive_far(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> Any:
     if status != OK:
         return status, 0.0
     c0, c1, x = np.empty((POINTS, 3)), np.empty((POINTS, 3)), np.empty(7)
-    corners(x0, b.h, b.tool, c0)
-    corners(x1, b.h, b.tool, c1)
+    place(b, x0, c0)
+    place(b, x1, c1)
     longest = 0.0
     for n in range(POINTS):
         d = sub(c1[n], c0[n])
@@ -258,14 +335,14 @@ def drive_far(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> Any:
             # Once for all of it: no corner of the body goes farther from its middle.
             last = min(n + EDGE_SHARE - 1, steps)
             between(x0, x1, (n + last) / (2 * steps), x)
-            corners(x, b.h, b.tool, c0)
+            place(b, x, c0)
             more = (last - n) / (2 * steps) * longest
             roomy = check_plate(s, b, c0, more, why) == OK
         whole = n % EDGE_SHARE == 0 or n == steps
         if roomy and not whole:
             continue
         between(x0, x1, n / steps, x)
-        corners(x, b.h, b.tool, c0)
+        place(b, x, c0)
         status = OK if roomy else check_plate(s, b, c0, 0.0, why)
         if whole and status == OK:
             status = check_links(s, b, c0, moving, why)

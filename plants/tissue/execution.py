@@ -1,6 +1,6 @@
 """How far a plan has been carried out: what a run that was killed goes on from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ class Execution:
             critical in m, -1 if nothing is, (2).
         way: Path of the tool in m.
         tau: Arrival times of the executed tissue, (nx, ny, nz); None at first.
+        bored: Moves after which further channels were bored.
     """
 
     posture: int = 0
@@ -33,6 +34,7 @@ class Execution:
     touched: tuple[float, float] = (0.0, -1.0)
     way: float = 0.0
     tau: NDArray[np.int32] | None = None
+    bored: list[int] = field(default_factory=list)
 
 
 def _digest(postures: NDArray) -> str:

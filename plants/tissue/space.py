@@ -7,8 +7,11 @@ from the start (the access channel), k where the k-th pose of the plan freed it,
 - a ball known to fit (`roomy`) need not be looked at again;
 - a path once driven stays free, so the way back is always open.
 
-A speculation (a candidate procedure) writes to the same arrays and is rolled back
-from its journal. Voxel (i, j, k) has its centre at origin + spacing (i, j, k).
+`solid` holds the same as bits, 64 voxels of a row in a word: most rows that a ball
+or a plate meets hold nothing solid, and one look tells.
+
+A speculation (a candidate procedure) writes to the same arrays and is rolled back from
+its journal. Voxel (i, j, k) has its centre at origin + spacing (i, j, k).
 """
 
 import math
@@ -17,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, along, dot, norm, sub
+from systems.common.geometry import Vector, along, dot, norm, sub, xyz
 
 SOLID = 2**31 - 1
 """Arrival time of tissue that nothing has removed."""
@@ -40,11 +43,16 @@ class Space(NamedTuple):
             in voxels, float32.
         roomy: 1 where a ball of the body's radius about any point of the voxel is
             known to be free, uint8.
+        solid: Bit c % 64 of word (a ny + b) words + c // 64 is set where voxel
+            (a, b, c) is solid, int64.
+        barred: The same where the tool may not be, int64.
         size: Voxels along x, y, z.
+        words: Words of a row of `solid`.
         origin: Centre of voxel (0, 0, 0) in the channel frame W, in m.
         spacing: Edge of a voxel in m.
-        channel: Radius of the access channel in m.
-        depth: Where the access robot's channel ends, in m along z.
+        channel: Radius of the access channels in m.
+        channels: Of each the point and the axis in W, and where it ends along
+            that in m, (n, 7).
         freed: Journal of voxels freed, int32.
         roomed: Journal of voxels found roomy, int32.
         used: Entries of either journal, int64 (2).
@@ -54,21 +62,66 @@ class Space(NamedTuple):
     allowed: Any
     inside: Any
     roomy: Any
+    solid: Any
+    barred: Any
     size: tuple[int, int, int]
+    words: int
     origin: tuple[float, float, float]
     spacing: float
     channel: float
-    depth: float
+    channels: Any
     freed: Any
     roomed: Any
     used: Any
 
 
 @compiled
+def off_axis(s: Space, k: int, p: Numbers) -> tuple[float, float]:
+    """A point's place along the axis of channel k, and its distance from it."""
+    o, n = xyz(s.channels[k], 0), xyz(s.channels[k], 3)
+    d = sub(p, o)
+    along_ = dot(d, n)
+    return along_, norm(sub(d, along((0.0, 0.0, 0.0), along_, n)))
+
+
+@compiled
 def in_channel(s: Space, p: Numbers, rho: float) -> bool:
-    """Whether a ball lies in the access channel."""
-    across2 = p[0] * p[0] + p[1] * p[1]
-    return p[2] + rho <= s.depth and across2 <= (s.channel - rho) ** 2
+    """Whether a ball lies in an access channel."""
+    for k in range(len(s.channels)):
+        far, across = off_axis(s, k, p)
+        if far + rho <= s.channels[k, 6] and across <= s.channel - rho:
+            return True
+    return False
+
+
+@compiled
+def bits(first: int, low: int, high: int) -> int:
+    """A word's mask of the voxels low to high - 1 of a row; its own begin at first."""
+    mask = -1
+    if low > first:
+        mask <<= low - first
+    if high < first + 64:
+        mask &= ~(-1 << (high - first))
+    return mask
+
+
+@compiled
+def ones(word: int) -> int:
+    """How many bits of a word are set."""
+    word -= (word >> 1) & 0x5555555555555555
+    word = (word & 0x3333333333333333) + ((word >> 2) & 0x3333333333333333)
+    word = (word + (word >> 4)) & 0x0F0F0F0F0F0F0F0F
+    return (word * 0x0101010101010101) >> 56
+
+
+@compiled
+def any_set(s: Space, plane: Any, a: int, b: int, low: int, high: int) -> bool:
+    """Whether any voxel (a, b, low) to (a, b, high - 1) is set in a plane of bits."""
+    row = (a * s.size[1] + b) * s.words
+    for w in range(low >> 6, (high + 63) >> 6):
+        if plane[row + w] & bits(w << 6, low, high):
+            return True
+    return False
 
 
 @compiled
@@ -138,9 +191,12 @@ def first_solid(s: Space, p: Numbers, rho: float) -> int:
     r = rho / s.spacing
     if not on_grid(s, u, (r, r, r)):
         return OUTSIDE
+    below, above = span(u[2], r, s.size[2])
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
+            if not any_set(s, s.solid, a, b, below, above):
+                continue
             first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.tau[c] == SOLID:
@@ -182,11 +238,14 @@ def plate_solid(s: Space, p: Numbers, n: Numbers, length: float, rho: float) -> 
     The cylinder starts at p and is `length` m long along n.
     """
     end = along(p, length, n)
-    rim = rho * math.sqrt(max(1.0 - n[2] * n[2], 0.0))
-    out = math.sqrt(p[0] * p[0] + p[1] * p[1])
-    far = math.sqrt(end[0] * end[0] + end[1] * end[1])
-    if max(p[2], end[2]) + rim <= s.depth and max(out, far) + rho <= s.channel:
-        return FREE
+    for k in range(len(s.channels)):
+        tilt = dot(n, xyz(s.channels[k], 3))
+        rim = rho * math.sqrt(max(1.0 - tilt * tilt, 0.0))
+        near, out = off_axis(s, k, p)
+        far, across = off_axis(s, k, end)
+        within = max(near, far) + rim <= s.channels[k, 6]
+        if within and max(out, across) + rho <= s.channel:
+            return FREE
     u = in_voxels(s, along(p, length / 2, n))
     r, h = rho / s.spacing, length / 2 / s.spacing
     half = (
@@ -197,10 +256,13 @@ def plate_solid(s: Space, p: Numbers, n: Numbers, length: float, rho: float) -> 
     if not on_grid(s, u, half):
         return OUTSIDE
     _, ny, nz = s.size
+    below, above = math.ceil(u[2] - half[2]), math.floor(u[2] + half[2]) + 1
     for a in range(math.ceil(u[0] - half[0]), math.floor(u[0] + half[0]) + 1):
         for b in range(math.ceil(u[1] - half[1]), math.floor(u[1] + half[1]) + 1):
+            if not any_set(s, s.solid, a, b, below, above):
+                continue
             row = (a * ny + b) * nz
-            for c in range(math.ceil(u[2] - half[2]), math.floor(u[2] + half[2]) + 1):
+            for c in range(below, above):
                 if s.tau[row + c] == SOLID:
                     d = sub((a, b, c), u)
                     axial = dot(d, n)
@@ -221,9 +283,12 @@ def first_forbidden(s: Space, p: Numbers, rho: float) -> int:
         return FREE
     if not on_grid(s, u, (r, r, r)):
         return OUTSIDE
+    below, above = span(u[2], r, s.size[2])
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
+            if not any_set(s, s.barred, a, b, below, above):
+                continue
             first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.allowed[c] == 0:
@@ -232,19 +297,41 @@ def first_forbidden(s: Space, p: Numbers, rho: float) -> int:
 
 
 @compiled
-def count_solid(s: Space, p: Numbers, rho: float) -> int:
-    """How many voxels of a ball are still solid."""
+def count_solid(s: Space, p: Numbers, rho: float, plane: Any) -> int:
+    """How many voxels of a ball are solid and set in a plane laid out as `solid`."""
     u = in_voxels(s, p)
     r = rho / s.spacing
     count = 0
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
-            first, last = row_span(s, u, left, a, b)
-            for c in range(first, last):
-                if s.tau[c] == SOLID:
-                    count += 1
+            rest = left - (b - u[1]) ** 2
+            if rest < 0.0:
+                continue
+            low, high = span(u[2], math.sqrt(rest), s.size[2])
+            row = (a * s.size[1] + b) * s.words
+            for w in range(low >> 6, (high + 63) >> 6):
+                word = s.solid[row + w] & plane[row + w]
+                if word:
+                    count += ones(word & bits(w << 6, low, high))
     return count
+
+
+@compiled
+def bit_of(s: Space, voxel: int) -> tuple[int, int]:
+    """The word of a voxel in `solid`, and its bit there."""
+    row, c = voxel // s.size[2], voxel % s.size[2]
+    return row * s.words + (c >> 6), 1 << (c & 63)
+
+
+@compiled
+def free(s: Space, voxel: int, time: int) -> None:
+    """Frees a voxel that is solid, at a time."""
+    word, bit = bit_of(s, voxel)
+    s.tau[voxel] = time
+    s.solid[word] &= ~bit
+    s.freed[s.used[0]] = voxel
+    s.used[0] += 1
 
 
 @compiled
@@ -252,22 +339,25 @@ def stamp(s: Space, p: Numbers, rho: float, time: int) -> None:
     """Frees what of a ball is still solid, at a time."""
     u = in_voxels(s, p)
     r = rho / s.spacing
+    below, above = span(u[2], r, s.size[2])
     for a in range(*span(u[0], r, s.size[0])):
         left = r * r - (a - u[0]) ** 2
         for b in range(*span(u[1], r, s.size[1])):
+            if not any_set(s, s.solid, a, b, below, above):
+                continue
             first, last = row_span(s, u, left, a, b)
             for c in range(first, last):
                 if s.tau[c] == SOLID:
-                    s.tau[c] = time
-                    s.freed[s.used[0]] = c
-                    s.used[0] += 1
+                    free(s, c, time)
 
 
 @compiled
 def roll_back(s: Space, freed: int, roomed: int) -> None:
     """Undoes all that the journals hold beyond these many entries."""
     for n in range(freed, s.used[0]):
+        word, bit = bit_of(s, s.freed[n])
         s.tau[s.freed[n]] = SOLID
+        s.solid[word] |= bit
     for n in range(roomed, s.used[1]):
         s.roomy[s.roomed[n]] = 0
     s.used[0], s.used[1] = freed, roomed
@@ -302,6 +392,14 @@ def nearest_in_ball(
                     if d <= r and d < best:
                         best, found = d, at
     return found, best * s.spacing
+
+
+def as_bits(mask: np.ndarray) -> np.ndarray:
+    """A mask (nx, ny, nz) as `Space.solid` has it, int64."""
+    words = -(-mask.shape[2] // 64)
+    wide = np.zeros((*mask.shape[:2], 64 * words), np.uint8)
+    wide[..., : mask.shape[2]] = mask
+    return np.packbits(wide, axis=2, bitorder="little").reshape(-1).view("<i8")
 
 
 def journals(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,20 +1,28 @@
 """Tissue carver: removes what the tool's true path sweeps, and sees what is touched."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.snake.kinematics import POINTS, corners
+from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import REST, Posture
-from plants.snake.snake_body import CULPRIT, OK, Body, between, body_of, check_body
+from plants.snake.snake_body import (
+    CULPRIT,
+    OK,
+    Body,
+    between,
+    body_of,
+    check_body,
+    place,
+)
 from plants.tissue.execution import Execution
 from plants.tissue.labels import CHANNEL, TUMOUR
-from plants.tissue.space import SOLID, Space, in_voxels, stamp
+from plants.tissue.space import Space, in_voxels, stamp
 from plants.tissue.volume import Volume
 from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled
@@ -41,6 +49,12 @@ class Moves(NamedTuple):
     """How many moves were carved."""
 
     number: Annotated[float, Field("1", "of them", 0.0)]
+
+
+class Entry(NamedTuple):
+    """Through which channel the robot works."""
+
+    number: Annotated[float, Field("1", "0 for the first", 0.0)]
 
 
 class Removed(NamedTuple):
@@ -94,16 +108,16 @@ def carve(
         in m.
     """
     c, x, why = np.empty((POINTS, 3)), np.empty(7), np.empty(CULPRIT)
-    corners(x0, b.h, b.tool, c)
+    place(b, x0, c)
     p = xyz(c[7], 0)
-    corners(x1, b.h, b.tool, c)
+    place(b, x1, c)
     way = norm(sub(c[7], p))
     steps = max(1, math.ceil(way / pitch))
     tumour, healthy, hits = 0, 0, 0
     nearest = math.inf
     for n in range(1, steps + 1):
         between(x0, x1, n / steps, x)
-        corners(x, b.h, b.tool, c)
+        place(b, x, c)
         hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
         stamp(s, c[7], b.radius, time)
@@ -160,26 +174,45 @@ class Carving:
             done: What has been carried out before.
         """
         self.volume = volume.fresh()
+        self.channels = volume.more
         self.done = done or Execution()
         if self.done.tau is not None:
             self.volume.tau[:] = self.done.tau
+            for channel, index in zip(volume.more, self.done.bored, strict=False):
+                self.volume.more.append(replace(channel, time=index))
+            self.volume.allow()
+            self.volume.refresh()
         self.tau = self.volume.tau.reshape(-1)
         self.labels = volume.labels.reshape(-1)
+        self.params = params
         self.body = body_of(params)
+        self.bodies = [self.body] + [
+            body_of(params, X_WE=channel.X_WE) for channel in volume.more
+        ]
         self.critical: NDArray[np.float32] = volume.to_critical.reshape(-1)
         self.latest = self.done.index
         self.space: Space = self.volume.space()
 
-    def move(self, index: int, x0: Any, x1: Any, pitch: float) -> Any:
-        """Carves from posture x0 to x1 as the index after `index`."""
+    def move(self, index: int, x0: Any, x1: Any, pitch: float, entry: int = 0) -> Any:
+        """Carves from posture x0 to x1 as the index after `index`, through an entry.
+
+        Its channel is bored if it has not been: the access robot's part, of which
+        the tumour counts as removed.
+        """
         if index < self.latest:
-            self.tau[(self.tau > index) & (self.tau != SOLID)] = SOLID
-            self.volume.roomy[:] = 0
-            self.space.used[:] = 0
+            self.volume.undo(index)
+            self.space = self.volume.space()
         self.latest = index + 1
-        return carve(
+        bored = 0
+        while len(self.volume.more) < entry:
+            channel = self.channels[len(self.volume.more)]
+            before = int(np.count_nonzero(self.volume.resected))
+            self.volume.bore(replace(channel, time=index + 1))
+            bored += int(np.count_nonzero(self.volume.resected)) - before
+            self.space = self.volume.space()
+        tumour, *others = carve(
             self.space,
-            self.body,
+            self.bodies[entry] if entry else self.body,
             self.labels,
             self.critical,
             x0,
@@ -187,6 +220,12 @@ class Carving:
             pitch,
             index + 1,
         )
+        return tumour + bored, *others
+
+    @property
+    def bored(self) -> list[int]:
+        """The indices at which further channels were bored."""
+        return [channel.time for channel in self.volume.more]
 
 
 class TissueCarver(Block):
@@ -196,6 +235,8 @@ class TissueCarver(Block):
     voxels are a memo of it (`Carving`).
 
     Port ``posture`` accepts the snake's true `Posture`.
+    Port ``entry`` accepts the number of the channel it works through; the first if
+    nothing is connected.
     Port ``index`` emits how many `Moves` were carved.
     Port ``removed`` emits the tissue `Removed`.
     Port ``touched`` emits what was `Touched`.
@@ -216,6 +257,7 @@ class TissueCarver(Block):
         self.carving = carving or Carving(_example_volume(), snake)
         self._voxel = self.carving.volume.voxel
         self._posture = self.signal_in("posture", Posture)
+        self._entry = self.signal_in("entry", Entry)
         done = self.carving.done
         self.state_out("index", Moves, flat(Moves(float(done.index))))
         self.state_out("removed", Removed, flat(done.removed))
@@ -242,6 +284,7 @@ class TissueCarver(Block):
             (hits, nearest),
             way,
             self.carving.volume.tau,
+            self.carving.bored,
         )
 
     def _state(self, context: Any) -> list[list[float]]:
@@ -250,9 +293,11 @@ class TissueCarver(Block):
 
     def _update(self, context: Any) -> Sequence[Any]:
         (index,), removed, touched, (way,), before = self._state(context)
-        x = self._posture.Eval(context)
+        x, entry = self._posture.Eval(context), 0
+        if self._entry.HasValue(context):
+            entry = int(self._entry.Eval(context)[0])
         tumour, healthy, hits, nearest, moved = self.carving.move(
-            int(index), np.array(before), x, self._params.pitch
+            int(index), np.array(before), x, self._params.pitch, entry
         )
         so_far = Touched(*touched)
         if math.isfinite(nearest):

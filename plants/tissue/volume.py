@@ -18,7 +18,7 @@ from scipy import ndimage
 
 from plants.tissue.critical import Boxes, cover
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
-from plants.tissue.space import SOLID, Space, journals
+from plants.tissue.space import SOLID, Space, as_bits, journals
 from plants.tissue.tissue import Tissue, parts_by_size, signed_distance
 from systems.common.parameter import Rules, check, parameter
 
@@ -56,6 +56,21 @@ class Access:
 
 
 @dataclass
+class Channel:
+    """A further access channel of a volume.
+
+    Attributes:
+        X_WE: Its frame E in W, z along it, the origin at the tumour's border, (4, 4).
+        depth: Where it ends, z in E in m.
+        time: Arrival time of what it frees.
+    """
+
+    X_WE: Vector
+    depth: float
+    time: int
+
+
+@dataclass
 class Volume:
     """Labels and arrival times.
 
@@ -73,6 +88,7 @@ class Volume:
             nz); empty if nothing is critical.
         mask_volume: Of the tumour as the mask has it, in m3; None if it is synthetic.
         notes: What was left out on the way here.
+        more: Channels beside the first, in the order in which they are bored.
     """
 
     labels: NDArray[np.uint8]
@@ -89,27 +105,53 @@ class Volume:
     )
     mask_volume: float | None = None
     notes: list[str] = field(default_factory=list)
+    more: list[Channel] = field(default_factory=list)
     inside: NDArray[np.float32] = field(init=False, repr=False)
     roomy: NDArray[np.uint8] = field(init=False, repr=False)
+    solid: NDArray[np.int64] = field(init=False, repr=False)
+    barred: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.tau.size == 0:
             start = np.isin(self.labels, (CHANNEL, CAP))
             self.tau = np.where(start, 0, SOLID).astype(np.int32)
-        self.allowed = np.isin(self.labels, (TUMOUR, CHANNEL, CAP)).astype(np.uint8)
         if self.critical is None and (self.labels == CRITICAL).any():
             X = np.diag([self.spacing] * 3 + [1.0])
             X[:3, 3] = self.origin
             self.critical = Boxes(np.argwhere(self.labels == CRITICAL), X)
-        if self.critical is not None:
-            if self.to_critical.size == 0:
-                _, self.to_critical = cover(
-                    self.critical, self.origin, self.spacing, self.labels.shape
-                )
-            self.allowed[self.to_critical <= self.margin] = 0
-        self.inside = ndimage.distance_transform_edt(self.allowed).astype(np.float32)
-        self.roomy = np.zeros(self.labels.shape, np.uint8)
+        if self.critical is not None and self.to_critical.size == 0:
+            _, self.to_critical = cover(
+                self.critical, self.origin, self.spacing, self.labels.shape
+            )
         self._journals = journals(self.labels.size)
+        self.allow()
+        self.refresh()
+
+    def may_be_removed(self) -> NDArray[np.uint8]:
+        """1 where the tool may be: tumour and channels, off what is critical."""
+        allowed = np.isin(self.labels, (TUMOUR, CHANNEL, CAP))
+        for channel in self.more:
+            allowed |= self.tube(channel)
+        if self.to_critical.size:
+            allowed &= self.to_critical > self.margin
+        return allowed.astype(np.uint8)
+
+    def refresh(self) -> None:
+        """Makes all that follows from arrival times agree with them."""
+        self.forget_journals()
+        self.roomy = np.zeros(self.labels.shape, np.uint8)
+        self.solid = as_bits(self.tau == SOLID)
+
+    def tube(self, channel: Channel) -> NDArray[np.bool_]:
+        """Voxels in a channel, (nx, ny, nz)."""
+        X_EW = np.linalg.inv(channel.X_WE)
+        sides = [
+            self.origin[r] + self.spacing * np.arange(self.labels.shape[r])
+            for r in range(3)
+        ]
+        x, y, z = np.ix_(*sides)
+        p, q, r = (X[0] * x + X[1] * y + X[2] * z + X[3] for X in X_EW[:3])
+        return (r <= channel.depth) & (p * p + q * q <= self.channel**2)
 
     @property
     def voxel(self) -> float:
@@ -138,19 +180,47 @@ class Volume:
             self.allowed.reshape(-1),
             self.inside.reshape(-1),
             self.roomy.reshape(-1),
+            self.solid,
+            self.barred,
             tuple(self.labels.shape),
+            -(-self.labels.shape[2] // 64),
             (float(self.origin[0]), float(self.origin[1]), float(self.origin[2])),
             self.spacing,
             self.channel,
-            self.depth,
+            np.array(
+                [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, self.depth]]
+                + [[*c.X_WE[:3, 3], *c.X_WE[:3, 2], c.depth] for c in self.more]
+            ),
             *self._journals,
         )
 
     def undo(self, time: int) -> None:
         """Puts back all that was freed after a time."""
         self.tau[(self.tau > time) & (self.tau != SOLID)] = SOLID
-        self.forget_journals()
-        self.roomy[:] = 0
+        if any(channel.time > time for channel in self.more):
+            self.more = [c for c in self.more if c.time <= time]
+            self.allow()
+        self.refresh()
+
+    def allow(self) -> None:
+        """Makes where the tool may be agree with the channels."""
+        self.allowed = self.may_be_removed()
+        self.barred = as_bits(self.allowed == 0)
+        self.inside = ndimage.distance_transform_edt(self.allowed).astype(np.float32)
+
+    def bore(self, channel: Channel) -> None:
+        """Bores a further channel: what lies in it is gone, and the tool may be there.
+
+        Raises:
+            ValueError: If something critical is nearer than the margin.
+        """
+        tube = self.tube(channel)
+        if self.to_critical.size and (self.to_critical[tube] <= self.margin).any():
+            raise ValueError("access: the channel runs through what is critical")
+        self.tau[tube & (self.tau == SOLID)] = channel.time
+        self.more.append(channel)
+        self.allow()
+        self.refresh()
 
     def forget_journals(self) -> None:
         """Makes what was freed until now final; it cannot be rolled back."""
@@ -166,8 +236,20 @@ class Volume:
         copy.__dict__.update(self.__dict__)
         start = np.isin(self.labels, (CHANNEL, CAP))
         copy.tau = np.where(start, 0, SOLID).astype(np.int32)
-        copy.roomy = np.zeros_like(self.roomy)
         copy._journals = journals(self.labels.size)
+        copy.refresh()
+        if copy.more:
+            copy.more = []
+            copy.allow()
+        return copy
+
+    def thought(self) -> "Volume":
+        """The same tissue as it is now, to be changed without consequence."""
+        copy = object.__new__(Volume)
+        copy.__dict__.update(self.__dict__)
+        copy.tau, copy.roomy = self.tau.copy(), self.roomy.copy()
+        copy.solid, copy._journals = self.solid.copy(), journals(self.labels.size)
+        copy.more = list(self.more)
         return copy
 
     def centre_of(self, voxel: int) -> Vector:

@@ -58,7 +58,7 @@ def measure(make: Callable[[], Session], seed: int, scenes: int) -> str:
     twice = find_reach(session, seed, 2.0, explain=False)
     spent = process_time() - start
     lines.append(f"  with twice the effort {twice.fraction:.4f} in {spent:.1f} s")
-    planner = Planner(session, reach.mask)
+    planner = Planner(session, reach)
     planner.enter()
     rng = np.random.default_rng(seed)
     times = []
@@ -77,7 +77,7 @@ def measure(make: Callable[[], Session], seed: int, scenes: int) -> str:
     )
     session = make()
     start = process_time()
-    Planner(session, reach.mask).run()
+    Planner(session, reach).run()
     lines.append(
         f"  plan of {session.fraction / reach.fraction:.4f} of the reachable part in "
         f"{process_time() - start:.1f} s, {len(session.steps)} steps"

@@ -12,19 +12,28 @@ from typing import Any
 import numpy as np
 
 from plants.snake.inverse_kernels import REACHED, solve_tool
-from plants.snake.kinematics import POINTS, corners, link_axis
-from plants.snake.snake_body import Body, drive_far
+from plants.snake.kinematics import POINTS, link_axis
+from plants.snake.snake_body import (
+    Body,
+    as_far_as_fits,
+    axis_from_entry,
+    drive_far,
+    from_entry,
+    place,
+)
 from plants.tissue.space import (
     FREE,
+    NEIGHBOUR,
     SOLID,
     Space,
     centre,
     count_solid,
     first_forbidden,
     roll_back,
+    voxel_of,
 )
 from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, along, dot, sub, unit
+from systems.common.geometry import Vector, along, dot, sub, unit, xyz
 from systems.resection.planning.draws import Draws, below, normal, uniform
 from systems.resection.planning.tree import (
     Tree,
@@ -40,6 +49,9 @@ NEAR = 12
 
 PLACES = 8
 """Places of the tool looked at for one target."""
+
+NUDGE = 0.2e-3
+"""How far from a seat a place is looked for, in m, at most times 2, 4, 6."""
 
 WAYS = 3
 """Ways to a place tried, each from a node near it and with axes of its own."""
@@ -67,7 +79,8 @@ def distance2(p: Numbers, q: Numbers) -> float:
 @compiled
 def tool_posture(b: Body, p: Numbers, n: Numbers, m: Numbers, x: Any) -> bool:
     """The posture (7,) with the tool at p, its axis n, intermediate axis m."""
-    return solve_tool(p, n, m, b.h, b.tool, b.bend, (b.low, b.high), x) == REACHED
+    q, u, v = from_entry(b, p), axis_from_entry(b, n), axis_from_entry(b, m)
+    return solve_tool(q, u, v, b.h, b.tool, b.bend, (b.low, b.high), x) == REACHED
 
 
 @compiled
@@ -78,6 +91,7 @@ def grow(
     draws: Draws,
     wanted: Any,
     tries: Any,
+    seats: Any,
     attempts: int,
     weary: int,
     least: int,
@@ -93,6 +107,7 @@ def grow(
         draws: Where random numbers come from.
         wanted: Flat indices of voxels to reach.
         tries: Failed attempts so far, int32, one a wanted voxel.
+        seats: Of all voxels the nearest at which the tool's ball fits, int32.
         attempts: How many to make.
         weary: Failed attempts after which a voxel is asked for no more.
         least: Voxels that a step must free to be made.
@@ -105,6 +120,7 @@ def grow(
     """
     found, far = np.empty(NEAR, np.int64), np.empty(NEAR)
     c, x = np.empty((POINTS, 3)), np.empty(7)
+    tight = b.radius / s.spacing - 2 * NEIGHBOUR
     made = 0
     for _ in range(attempts):
         # Of a few voxels drawn the one asked for least, and in a plan the nearest.
@@ -124,11 +140,19 @@ def grow(
         v = centre(s, wanted[pick])
         # Of some places that hold the voxel the one where most is left.
         most, p = 0, v
-        for _ in range(PLACES):
+        for turn in range(PLACES):
             d = tilted(draws, (0.0, 0.0, 0.0), 1.0)
-            q = along(v, b.radius * uniform(draws) ** (1 / 3), d)
+            if turn % 2:
+                q = along(v, b.radius * uniform(draws) ** (1 / 3), d)
+            else:
+                # At the wall the ball fits in few places: near the seat.
+                seat = centre(s, seats[wanted[pick]])
+                q = along(seat, turn * NUDGE * uniform(draws), d)
+            at = voxel_of(s, q)
+            if at < 0 or s.inside[at] < tight or distance2(q, v) > b.frees**2:
+                continue
             if first_forbidden(s, q, b.radius) == FREE:
-                there = count_solid(s, q, b.frees)
+                there = count_solid(s, q, b.frees, s.solid)
                 if there > most:
                     most, p = there, q
         tries[pick] += 1
@@ -144,11 +168,16 @@ def grow(
                 node = found[0]
             if way == 0 and close:
                 node = at_node  # from where it stands it need not go anywhere first
-            corners(t.x[node], b.h, b.tool, c)
+            place(b, t.x[node], c)
             spread = 0.5 * uniform(draws) ** 2
-            n = tilted(draws, link_axis(c, 5, b.h), spread)
+            k = tilted(draws, link_axis(c, 5, b.h), spread)
             m = tilted(draws, link_axis(c, 3, b.h), spread)
-            if not tool_posture(b, p, n, m, x):
+            if not tool_posture(b, p, k, m, x):
+                continue
+            if not as_far_as_fits(s, b, t.x[node], x):
+                continue
+            place(b, x, c)
+            if count_solid(s, xyz(c[7], 0), b.frees, s.solid) < least:
                 continue
             freed, roomed = s.used[0], s.used[1]
             _, share = drive_far(s, b, t.x[node], x, t.size[1], why)

@@ -1,10 +1,11 @@
-"""The automatic planner: entry, greedy clipped procedures, finisher.
+"""The automatic planner: a pilot entry, then strokes.
 
-Space only grows, so a procedure that is feasible stays so, and a greedy choice can
-waste procedures but never lose tissue. The entry is driven in passes of growing
-bend: the pilot makes the room in which the next pass may bend. Then come the
-procedures that gain most among random ones, and at last single steps, lump by lump:
-first those that gain much, then those that gain little.
+Space only grows, so what is feasible stays so, and a greedy choice can waste time but
+never lose tissue. The pilot makes the room in which modules may bend; then come strokes
+(`strokes`), first those that free most a second, then those that free less. They begin
+at edges of the tree by which the reachable part was found. The plan is then driven
+again and again in thought, each time without the detours that it turns out not to need
+(`tighten`), with strokes for what that leaves; the quickest is kept.
 """
 
 from collections.abc import Callable
@@ -14,16 +15,25 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.snake.last_module import meridian
-from plants.tissue.labels import TUMOUR
-from plants.tissue.space import SOLID
+from plants.tissue.space import SOLID, as_bits
 from systems.common.parameter import Rules, check, parameter
 from systems.resection.planning.draws import new_draws
-from systems.resection.planning.growth import grow
-from systems.resection.planning.procedure import ELEMENTARY, ENTRY, Procedure
-from systems.resection.planning.session import Session
+from systems.resection.planning.entry import PILOT, entry_pass, radius_of
+from systems.resection.planning.procedure import ELEMENTARY, Procedure
+from systems.resection.planning.reach import Reach, coverable, search
+from systems.resection.planning.session import STROKES, Session
+from systems.resection.planning.strokes import (
+    Goal,
+    Library,
+    Pace,
+    fresh,
+    new_library,
+    stroke,
+)
 from systems.resection.planning.sweep import intermediate, straightened, try_procedure
+from systems.resection.planning.tighten import tightened
 from systems.resection.planning.tree import nearest_nodes
+from systems.resection.wires.procedure_player import ProcedurePlayerParams, schedule
 
 NEAR = 16
 """Nodes near a voxel among which a candidate's start is drawn."""
@@ -31,19 +41,25 @@ NEAR = 16
 TURNS = 5
 """Turns of a candidate's axis that are tried, each half the one before."""
 
-VAIN = 5
-"""Rounds of the last stage in a row that free nothing, after which it ends."""
+BATCH = 100
+"""Strokes begun between two looks at the target."""
 
-WEARY = 100
-"""Failed attempts after which a round asks for a voxel no more."""
+WALL = 1.5e-3
+"""How near to where the tool may not be tissue counts as wall, in m."""
+
+FIRST_RATE = 10e-9
+"""Of strokes in m3/s, weighted; each stage's is `FALL` of the one before."""
+
+FALL = 0.7
 
 
 @dataclass
 class PlannerParams:
     """How the planner goes about it."""
 
+    # Above 1, since the plan may find more than the search did.
     target: float = parameter(
-        0.986, "share of the reachable part at which it stops", above=0.0, most=1.0
+        1.005, "share of the reachable part at which it stops", above=0.0, most=1.2
     )
     pitch: float = parameter(
         2.0e-3, "of poses when carried out", "m", least=5e-4, most=6e-3
@@ -52,7 +68,7 @@ class PlannerParams:
         3.0e-3, "of poses when a candidate is tried", "m", least=5e-4, most=6e-3
     )
     passes: list[float] = parameter(
-        [math.radians(8.0), math.radians(20.0), math.pi / 4],
+        [PILOT],
         "largest bends of the entry's passes",
         "rad",
         above=0.0,
@@ -65,44 +81,33 @@ class PlannerParams:
     lengths: list[float] = parameter(
         [0.0, 0.006, 0.012], "of candidates", "m", least=0.0, most=0.1, shape=(-1,)
     )
-    # Below it the finisher takes over.
     least_gain: float = parameter(
         0.01,
-        "of a procedure, as a share of the reachable part",
+        "of a procedure that is suggested, as a share of the reachable part",
         least=0.0,
         most=1.0,
     )
-    lump: float = parameter(
-        0.006,
-        "how far the finisher looks from where it starts a lump",
-        "m",
-        least=5e-4,
-        most=0.1,
-    )
-    step_gains: list[float] = parameter(
-        [27e-9, 9e-9, 3e-9, 0.6e-9, 0.25e-9],
-        "tumour that a step of the finisher must free, stage by stage",
-        "m3",
+    least_rate: float = parameter(
+        0.15e-9,
+        "tumour that a stroke must free a second, the wall weighted",
+        "m3/s",
         least=0.0,
         most=1e-6,
-        shape=(-1,),
     )
-    rounds: int = parameter(
-        4,
-        "through all lumps in a stage but the last, which goes on",
-        least=1,
-        most=1000,
+    tightenings: int = parameter(
+        4, "times that the plan is driven again without its detours", least=0, most=100
     )
-    # Four times as many in the last stage.
-    attempts: int = parameter(
-        400,
-        "steps in a lump before the finisher looks at what they gained",
-        least=1,
-        most=1_000_000,
+    # At first; every second one prices it at three times as much.
+    worth: float = parameter(
+        1.0e-9,
+        "tumour that may be left to save a second, when detours are left out",
+        "m3",
+        above=0.0,
+        most=1e-6,
     )
     budget: int = parameter(
-        20_000_000,
-        "single steps that the finisher tries at most",
+        1_000_000,
+        "strokes that a plan begins at most",
         least=1,
         most=10_000_000_000,
     )
@@ -110,8 +115,7 @@ class PlannerParams:
 
     def rules(self) -> Rules:
         """There must be something to try."""
-        for name in ("lengths", "step_gains"):
-            yield bool(getattr(self, name)), name, "at least one"
+        yield bool(self.lengths), "lengths", "at least one"
 
 
 class Planner:
@@ -120,35 +124,47 @@ class Planner:
     def __init__(
         self,
         session: Session,
-        reachable: NDArray[np.bool_],
+        reachable: Reach | NDArray[np.bool_],
         params: PlannerParams | None = None,
         progress: Callable[[float], None] = lambda share: None,
+        player: ProcedurePlayerParams | None = None,
     ) -> None:
         """Makes a planner.
 
         Args:
             session: What is planned; it may have steps already.
-            reachable: Tumour voxels that can be reached, the goal.
+            reachable: What can be reached; or tumour voxels, the goal, (nx, ny, nz).
             params: How.
             progress: Called with the share of the goal that is planned.
+            player: Rates and accelerations at which the plan will be played.
         """
         self.session = session
         self.params = check(params or PlannerParams())
-        self.goal = np.flatnonzero(reachable.reshape(-1)).astype(np.int32)
+        self.reach = reachable if isinstance(reachable, Reach) else None
+        mask = self.reach.mask if self.reach else np.asarray(reachable)
+        self.reachable = int(np.count_nonzero(mask))
+        if self.reach is not None:
+            mask = coverable(session.volume, session.body.radius)
+        self.goal = np.flatnonzero(mask.reshape(-1)).astype(np.int32)
         self.progress = progress
+        self.player = player or ProcedurePlayerParams()
         self.rng = np.random.default_rng(self.params.seed)
-        self.draws = new_draws(self.params.seed + len(session.steps))
         self.tried = 0
 
-    def left(self) -> NDArray[np.int32]:
+    def left(self, session: Session | None = None) -> NDArray[np.int32]:
         """Voxels of the goal that are still there."""
-        tau = self.session.volume.tau.reshape(-1)
+        tau = (session or self.session).volume.tau.reshape(-1)
         return self.goal[tau[self.goal] == SOLID]
 
     @property
     def share(self) -> float:
-        """Of the goal that is planned."""
-        return 1.0 - len(self.left()) / max(len(self.goal), 1)
+        """Planned, of what can be reached; the plan may find more than the search."""
+        return self.share_of(self.session)
+
+    def share_of(self, session: Session) -> float:
+        """As `share`, of another session."""
+        gone = len(self.goal) - len(self.left(session))
+        return gone / max(self.reachable, 1)
 
     def run(self) -> None:
         """Plans to the target, or as far as it goes, and home.
@@ -158,48 +174,90 @@ class Planner:
         if self.session.concluded == repr(self.params):
             return
         self.enter()
-        while self.share < self.params.target and self.choose():
-            self.progress(self.share)
-        for stage, gain in enumerate(self.params.step_gains):
-            last = stage + 1 == len(self.params.step_gains)
-            attempts = self.params.attempts * (4 if last else 1)
-            rounds, vain = 0, 0
-            while (last or rounds < self.params.rounds) and self.unfinished():
-                vain = 0 if self.finish(gain, attempts) else vain + 1
-                if vain == (VAIN if last else 1):
-                    break
-                rounds += 1
-                self.progress(self.share)
-        if self.session.steps and self.session.steps[-1].kind != "home":
-            self.session.go_home()
+        pace = Pace(self.player.travel_rate, self.player.bend_rate, self.player.turn)
+        library = self.library()
+        plan = self.session.thought()
+        self.stroke(plan, pace, fresh(library), 0)
+        best, least = plan, self.price(plan)
+        for number in range(self.params.tightenings):
+            worth = self.params.worth * (3.0 if number % 2 else 1.0)
+            plan = tightened(
+                self.session, plan, self.goal, pace, self.player.lead, worth
+            )
+            plan.record("strokes 1", STROKES, self.session.standing())
+            self.stroke(plan, pace, fresh(library), number + 1)
+            price = self.price(plan)
+            if price < least:
+                best, least = plan, price
+        best.go_home()
+        self.session.adopt(best)
         self.session.concluded = repr(self.params)
         self.session.save_if_filed()
 
-    def unfinished(self) -> bool:
-        """Whether the target is not reached, and some of the budget is left."""
-        return self.share < self.params.target and self.tried < self.params.budget
+    def price(self, plan: Session) -> float:
+        """What a plan costs: its time, and that of what it leaves, in s."""
+        time = float(schedule(plan.postures, self.player)[-1])
+        lost = max(self.params.target - self.share_of(plan), 0.0) * self.reachable
+        return time + lost * plan.volume.voxel / max(self.params.least_rate, 1e-12)
 
-    def _radius(self, bend: float) -> float:
-        params = self.session.params
-        return float(meridian(bend, params)[0]) + params.tool_radius
+    def library(self) -> Library:
+        """Where strokes may begin: what the search found, or one made now."""
+        if self.reach is not None:
+            return new_library(self.reach.x, self.reach.parent, self.reach.nodes)
+        thought = self.session.thought()
+        nodes = int(thought.tree.size[0])
+        search(thought, new_draws(self.params.seed), 0.25)
+        end = int(thought.tree.size[0])
+        return new_library(
+            thought.tree.x[nodes:end], thought.tree.parent[nodes:end], nodes
+        )
+
+    def stroke(
+        self, session: Session, pace: Pace, library: Library, number: int
+    ) -> None:
+        """Strokes of falling gain until the target, a step of the plan for each rate.
+
+        Args:
+            session: What is planned.
+            pace: The robot's.
+            library: Where strokes may begin.
+            number: Of the plan: its random moves are its own.
+        """
+        volume, params = session.volume, self.params
+        wanted = np.zeros(volume.labels.shape, bool)
+        wanted.reshape(-1)[self.goal] = True
+        near = volume.inside <= WALL / volume.spacing
+        goal = Goal(as_bits(wanted), as_bits(wanted & near))
+        draws = new_draws(1000 * params.seed + number)
+        rate, begun = FIRST_RATE, 0
+        while rate > params.least_rate * FALL:
+            rate = max(rate, params.least_rate)
+            before = session.standing()
+            while begun < params.budget and self.share_of(session) < params.target:
+                session.volume.forget_journals()
+                session.make_room()
+                most = min(BATCH, params.budget - begun)
+                count = stroke(
+                    volume.space(), session.body, session.tree, draws, pace, goal,
+                    library, rate / volume.voxel, most, session.why,
+                )  # fmt: skip
+                begun += count
+                self.progress(max(self.share, self.share_of(session)))
+                if count < most:
+                    break
+            if session.standing()[1] > before[1]:
+                number = 1 + sum(step.kind == STROKES for step in session.steps)
+                session.record(f"strokes {number}", STROKES, before)
+            rate *= FALL
+        self.tried = max(self.tried, begun)
 
     def enter(self) -> None:
         """The entry's passes, to the far end of the tumour, but those made before."""
-        volume = self.session.volume
-        deepest = float(volume.points(volume.labels == TUMOUR)[:, 2].max())
-        length = deepest - volume.depth + self.session.params.tool_radius
-        travel = self.session.params.travel[1] - float(self.session.home[0])
-        length = min(max(length, self.params.pitch), travel)
         for number, bend in enumerate(self.params.passes):
-            name = "pilot entry" if number == 0 else f"entry {number + 1}"
-            procedure = Procedure(
-                kind=ENTRY,
-                length=length,
-                radius=self._radius(bend),
-                clipped=True,
-                pitch=self.params.pitch,
-                name=name,
-            )
+            name = "pilot entry" if number == 0 else f"entry pass {number + 1}"
+            if self.session.volume.more:
+                name += f", channel {1 + len(self.session.volume.more)}"
+            procedure = entry_pass(self.session, bend, self.params.pitch, name)
             if not any(step.procedure == procedure for step in self.session.steps):
                 self.session.commit(procedure)
             self.progress(self.share)
@@ -245,7 +303,7 @@ class Planner:
         params = self.session.params
         p_WI, n = map(np.array, intermediate(self.session.body, x))
         start = p_WI + (params.straight_module + params.tool_offset) * n
-        radius = self._radius(params.max_bend)
+        radius = radius_of(params.max_bend, params)
         number = 1 + sum(step.kind == ELEMENTARY for step in self.session.steps)
         return Procedure(
             ELEMENTARY,
@@ -261,46 +319,3 @@ class Planner:
     def choose(self) -> bool:
         """Commits the best that is suggested; False if nothing is."""
         return any(self.session.commit(p).feasible for p in self.suggest())
-
-    def finish(self, gain: float, attempts: int) -> bool:
-        """Single steps in the lumps that are left, nearest first; False if vain.
-
-        Args:
-            gain: Tumour that a step must free, in m3.
-            attempts: In a lump before it is looked at what they gained.
-        """
-        session, params = self.session, self.params
-        session.volume.forget_journals()
-        session.make_room()
-        before = session.standing()
-        volume = session.volume
-        s, b, t, why = volume.space(), session.body, session.tree, session.why
-        least = max(1, round(gain / volume.voxel))
-        left = self.left()
-        size = np.array(volume.labels.shape)
-        points = np.column_stack(np.unravel_index(left, size)) * volume.spacing
-        open_ = np.ones(len(left), bool)
-        made = 0
-        while open_.any() and self.unfinished() and session.roomy():
-            tip = session.tips[-1] - volume.origin
-            rest = np.flatnonzero(open_)
-            seed = rest[int(np.argmin(((points[rest] - tip) ** 2).sum(axis=1)))]
-            near = ((points - points[seed]) ** 2).sum(axis=1) < params.lump**2
-            lump = left[near & open_]
-            open_ &= ~near
-            tries = np.zeros(len(lump), np.int32)
-            while len(lump) and session.roomy():
-                count = min(attempts, params.budget - self.tried)
-                done = grow(
-                    s, b, t, self.draws, lump, tries, count, WEARY, least, True, why
-                )
-                self.tried += count
-                made += done
-                alive = (s.tau[lump] == SOLID) & (tries < WEARY)
-                lump, tries = lump[alive], tries[alive]
-                if done < 2:
-                    break
-        if made:
-            number = 1 + sum(step.kind == "finish" for step in session.steps)
-            session.record(f"finish {number}", "finish", before)
-        return made > 0

@@ -1,12 +1,12 @@
-"""The reachable part: what this robot could remove through this channel at all.
+"""The reachable part: what this robot could remove through its channels at all.
 
-A method of its own, beside the planner: a tree of single random steps grows from
-home into the tumour. Each step goes straight from a posture that was reached towards
-a tissue voxel that is still there, body in free space, tool in what it may remove,
-and as far as that lasts. Space only grows, so the order does not matter and what one
-step freed helps all others: the tree tends to the one largest set that can be
-reached. It ends when steps no longer gain anything; a longer search finds little more
-(see `effort`).
+A method of its own, beside the planner: after an entry in thought a tree of single
+random steps grows into the tumour. Each step goes straight from a posture that was
+reached towards a tissue voxel that is still there, body in free space, tool in what
+it may remove, and as far as that lasts. Space only grows, so the order does not matter
+and what one step freed helps all others: the tree tends to the one largest set that can
+be reached. It ends when steps hardly gain anything; a longer search finds little more
+(see `effort`). Its tree is the library of the planner's strokes.
 """
 
 from collections import Counter
@@ -20,30 +20,33 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.snake.kinematics import POINTS, corners
-from plants.snake.snake_body import CULPRIT, OK, body_of, check_body
+from plants.snake.kinematics import POINTS
+from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, place
 from plants.tissue.labels import BRAIN, CRITICAL, NAMES, TUMOUR
 from plants.tissue.space import FREE, SOLID, first_forbidden
 from plants.tissue.volume import Volume
 from systems.common.archive import read_archive, write_archive
 from systems.resection.planning.draws import Draws, new_draws
+from systems.resection.planning.entry import PILOT, entry_pass
 from systems.resection.planning.growth import grow, tilted, tool_posture
 from systems.resection.planning.session import Session
-from systems.resection.planning.tree import grown, new_tree
 
 ROUND = 20_000
-"""Attempts between two looks at what is left."""
+"""Attempts between two looks at what is left, at effort 1."""
 
 WEARY = 2000
 """Failed attempts after which a voxel is asked for no more, at effort 1."""
 
-ROOMY = 40.0e-6
-"""A smaller tumour, in m3, is searched longer, up to four times."""
+LEAST = 3
+"""Voxels that a step must free."""
+
+PITCH = 2e-3
+"""Of the entry in thought, in m."""
 
 LEAST_LUMP = 2e-9
 """Volume in m3 of the smallest part that is told."""
 
-STALL = 0.001
+STALL, ROUNDS = 0.003, 3
 """A search whose last rounds gain less of the tumour than this has ended."""
 
 
@@ -72,6 +75,10 @@ class Reach:
         time: That the search took, in s.
         steps: Postures of its tree.
         lumps: What is not reached and why, largest first.
+        x: Postures beyond the nodes that the session's tree had, (n, 7).
+        parent: The node or posture each was reached from, (n,): numbered as in a
+            tree that has them after its own.
+        nodes: How many those nodes were.
     """
 
     mask: NDArray[np.bool_]
@@ -79,6 +86,9 @@ class Reach:
     time: float
     steps: int
     lumps: list[Lump]
+    x: NDArray[np.float64]
+    parent: NDArray[np.int32]
+    nodes: int
 
 
 def find_reach(
@@ -87,47 +97,102 @@ def find_reach(
     effort: float = 1.0,
     explain: bool = True,
     progress: Callable[[float], None] = lambda share: None,
+    anew: bool = True,
 ) -> Reach:
-    """Computes the reachable part of a session's tumour from its beginning.
+    """Computes the reachable part of a session's tumour.
 
     Args:
-        session: Its volume and robot; what it has removed does not matter.
+        session: Its volume and robot.
         seed: Of the random steps.
         effort: Scales how long a search without success goes on.
         explain: Whether to say why the rest is not reached.
         progress: Called with the share of the tumour that is reached.
+        anew: From its beginning, through the first entry: what has been removed
+            does not matter. Otherwise from how things stand, through the entry in
+            which the robot is.
     """
     start = perf_counter()
-    volume, body = session.volume.fresh(), body_of(session.params)
-    s, why = volume.space(), np.zeros(CULPRIT)
+    scratch = session.thought()
+    if anew:
+        scratch = Session(
+            session.volume.fresh(), session.params, session.clearance, session.accuracy
+        )
+    volume, first = scratch.volume, int(scratch.tree.size[0])
+    for bend in (PILOT, session.params.max_bend):
+        scratch.commit(entry_pass(scratch, bend, PITCH, "entry"))
     draws = new_draws(seed)
-    tree = new_tree(session.home, session.tree.tip[0], ROUND, ROUND)
-    tumour = (volume.labels == TUMOUR).reshape(-1)
-    opening = _opening(volume, body.radius).reshape(-1)
-    wanted = np.flatnonzero(tumour & opening).astype(np.int32)
-    tries = np.zeros(len(wanted), np.int32)
-    total = int(np.count_nonzero(tumour))
-    # Where there is little room the way is harder to find, and a try costs less.
-    effort *= min(max(ROOMY / (total * volume.voxel), 1.0), 4.0)
-    patience, weary = max(1, round(32 * effort)), max(1, round(WEARY * effort))
-    history = [0]
-    while len(wanted):
-        tree = grown(tree, ROUND, ROUND)
-        grow(s, body, tree, draws, wanted, tries, ROUND, weary, 3, False, why)
-        left = (s.tau[wanted] == SOLID) & (tries < weary)
-        wanted, tries = wanted[left], tries[left]
-        history.append(int(s.used[0]))
-        progress(history[-1] / total)
-        if len(history) > 2 * patience:
-            recent = history[-1] - history[-1 - patience]
-            if recent < STALL * patience / 4 * total:
-                break
+    search(scratch, draws, effort, progress)
     mask = volume.resected
-    fraction = float(np.count_nonzero(mask)) / total
+    fraction = int(mask.sum()) / int((volume.labels == TUMOUR).sum())
     lumps = []
     if explain:
-        lumps = _lumps(session, volume, opening.reshape(mask.shape), draws)
-    return Reach(mask, fraction, perf_counter() - start, int(tree.size[0]), lumps)
+        opening = _opening(volume, scratch.body.radius)
+        lumps = _lumps(scratch, volume, opening, draws)
+    nodes = int(scratch.tree.size[0])
+    return Reach(
+        mask,
+        fraction,
+        perf_counter() - start,
+        nodes,
+        lumps,
+        scratch.tree.x[first:nodes].copy(),
+        scratch.tree.parent[first:nodes].copy(),
+        first,
+    )
+
+
+def search(
+    session: Session,
+    draws: Draws,
+    effort: float = 1.0,
+    progress: Callable[[float], None] = lambda share: None,
+) -> None:
+    """Grows a session's tree, in place, until steps gain hardly anything.
+
+    Args:
+        session: In thought: what steps free is gone, but no step is recorded.
+        draws: Where random numbers come from.
+        effort: Scales the search.
+        progress: Called with the share of the tumour that is reached.
+    """
+    volume, body = session.volume, session.body
+    s = volume.space()
+    total = int(np.count_nonzero(volume.labels == TUMOUR))
+    can = coverable(volume, body.radius).reshape(-1)
+    wanted = np.flatnonzero(can & (s.tau == SOLID)).astype(np.int32)
+    tries, seats = np.zeros(len(wanted), np.int32), seats_of(volume, body.radius)
+    attempts, weary = max(1, round(ROUND * effort)), max(1, round(WEARY * effort))
+    gone = [int(np.count_nonzero(volume.resected))]
+    while len(wanted):
+        volume.forget_journals()
+        session.make_room()
+        grow(
+            s, body, session.tree, draws, wanted, tries, seats, attempts, weary, LEAST,
+            False, session.why,
+        )  # fmt: skip
+        left = (s.tau[wanted] == SOLID) & (tries < weary)
+        wanted, tries = wanted[left], tries[left]
+        gone.append(gone[-1] + int(s.used[0]))
+        progress(gone[-1] / total)
+        if len(gone) > ROUNDS and gone[-1] - gone[-1 - ROUNDS] < STALL * total:
+            break
+
+
+def coverable(volume: Volume, radius: float) -> NDArray[np.bool_]:
+    """Tumour that a ball covers which stays where it may be, (nx, ny, nz)."""
+    return (volume.labels == TUMOUR) & (volume.allowed > 0) & _opening(volume, radius)
+
+
+def seats_of(volume: Volume, radius: float) -> NDArray[np.int32]:
+    """The nearest voxel where a ball may be, flat index, of every voxel, flat."""
+    fits = volume.inside >= radius / volume.spacing
+    if not fits.any():
+        return np.arange(fits.size, dtype=np.int32)
+    nearest = ndimage.distance_transform_edt(
+        ~fits, return_distances=False, return_indices=True
+    )
+    seats: NDArray = np.ravel_multi_index(tuple(nearest), fits.shape)
+    return seats.astype(np.int32).reshape(-1)
 
 
 def save_reach(
@@ -141,7 +206,8 @@ def save_reach(
         "steps": reach.steps,
         "lumps": [asdict(lump) for lump in reach.lumps],
     }
-    write_archive(path, meta, {"mask": reach.mask})
+    arrays = {"mask": reach.mask, "x": reach.x, "parent": reach.parent}
+    write_archive(path, meta, arrays)
 
 
 def load_reach(path: Path, session: Session, seed: int, effort: float) -> Reach | None:
@@ -150,15 +216,25 @@ def load_reach(path: Path, session: Session, seed: int, effort: float) -> Reach 
         meta, arrays = read_archive(path, "reach")
     except ValueError:
         return None  # it can be computed again
-    if meta["key"] != _key(session, seed, effort):
+    if meta["key"] != _key(session, seed, effort) or "x" not in arrays:
         return None
     lumps = [Lump(**row) for row in meta["lumps"]]
-    return Reach(arrays["mask"], meta["fraction"], meta["time"], meta["steps"], lumps)
+    return Reach(
+        arrays["mask"],
+        meta["fraction"],
+        meta["time"],
+        meta["steps"],
+        lumps,
+        arrays["x"],
+        arrays["parent"],
+        1,
+    )
 
 
 def _key(session: Session, seed: int, effort: float) -> str:
     labels = hashlib.sha256(session.volume.labels.tobytes()).hexdigest()
-    return f"{labels} {session.volume.margin} {session.params} {seed} {effort}"
+    body = f"{session.params} {session.clearance} {session.accuracy}"
+    return f"{labels} {session.volume.margin} {body} {seed} {effort}"
 
 
 def _opening(volume: Volume, radius: float) -> NDArray[np.bool_]:
@@ -229,7 +305,7 @@ def _reason(
         if not tool_posture(body, p, n, m, x):
             blame["beyond the robot's bends"] += 1
             continue
-        corners(x, body.h, body.tool, c)
+        place(body, x, c)
         if check_body(s, body, c, 0, why) == OK:
             blame[NO_WAY] += 3
             continue

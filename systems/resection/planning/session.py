@@ -1,17 +1,17 @@
 """A resection as a session: propose, check, preview, commit, undo, save, resume."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.snake.kinematics import POINTS, corners
+from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import CULPRIT, OK, Body, body_of
+from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
-from plants.tissue.volume import Volume
+from plants.tissue.volume import Channel, Volume
 from systems.common.archive import read_archive, write_archive
 from systems.common.parameter import check
 from systems.resection.planning.feasibility import (
@@ -24,7 +24,6 @@ from systems.resection.planning.feasibility import (
     tips_of,
 )
 from systems.resection.planning.procedure import (
-    ENTRY,
     Procedure,
     check_procedure,
     procedure_of,
@@ -34,18 +33,28 @@ from systems.resection.planning.procedure import (
 from systems.resection.planning.sweep import LIMIT, posture_at, sweep_procedure
 from systems.resection.planning.tree import (
     Tree,
+    copied,
+    cut,
+    enlist_all,
     extend,
     go_to,
     grown,
     nearest_nodes,
     new_tree,
+    tree_of,
 )
 
 ROOM = 60_000
 """Nodes, and visits, that one step of a session may need."""
 
-FORMAT = 2
-"""Of a session's file; from 2 on it holds what is critical as the mask has it."""
+FORMAT = 3
+"""Of a session's file; 2: what is critical as the mask has it; 3: several entries."""
+
+STROKES = "strokes"
+"""Kind of a step that is no procedure: see `strokes`."""
+
+ACCESS = "access"
+"""Kind of a step in which the access robot is set anew."""
 
 STARTS = 24
 """Nodes from which a procedure's start is tried."""
@@ -57,7 +66,8 @@ class Step:
 
     Attributes:
         name: What it is called.
-        kind: "entry", "elementary", "volume", "finish" or "home".
+        kind: "entry", "elementary", "volume", "strokes", "home" or "access": the
+            robot withdrawn, and set anew at the end of another channel.
         first: Its first visit in the route.
         last: One past its last visit.
         nodes: Nodes of the tree before it.
@@ -99,12 +109,30 @@ class Session:
 
     def __post_init__(self) -> None:
         check(self.params)
-        self.body: Body = body_of(self.params, self.clearance, self.accuracy)
         self.home = home_posture(self.volume, self.params)
+        self.stand()
         c = np.empty((POINTS, 3))
-        corners(self.home, self.body.h, self.body.tool, c)
+        place(self.body, self.home, c)
         self.tree: Tree = new_tree(self.home, c[7], ROOM, ROOM)
         self.why = np.zeros(CULPRIT)
+
+    def stand(self) -> None:
+        """Puts the robot into the channel bored last."""
+        self.body: Body = body_of(
+            self.params, self.clearance, self.accuracy, X_WE=self.X_WE
+        )
+
+    @property
+    def X_WE(self) -> NDArray[np.float64]:
+        """Pose of the frame of the entry worked through, (4, 4)."""
+        return self.volume.more[-1].X_WE if self.volume.more else np.eye(4)
+
+    @property
+    def entries(self) -> NDArray[np.int64]:
+        """The entry through which each posture of the plan is reached, (n,)."""
+        times = [channel.time for channel in self.volume.more]
+        visits = np.arange(int(self.tree.size[1]))
+        return np.searchsorted(np.array(times, int), visits, side="right")
 
     # What is asked -----------------------------------------------------------
 
@@ -141,7 +169,12 @@ class Session:
         step = self.steps.pop()
         self.concluded = ""
         self.volume.undo(step.first - 1)
-        self.tree.size[:] = step.nodes, step.first
+        cut(self.tree, step.nodes, step.first)
+        if step.kind == ACCESS:
+            roots = np.flatnonzero(self.tree.parent[: step.nodes] < 0)
+            self.tree.size[2] = roots[-1]
+            enlist_all(self.tree)
+            self.stand()
         self.save_if_filed()
         return step
 
@@ -157,7 +190,7 @@ class Session:
 
     def _take_back(self, mark: tuple[int, int, int, int]) -> None:
         roll_back(self.volume.space(), mark[0], mark[1])
-        self.tree.size[:] = mark[2:]
+        cut(self.tree, *mark[2:])
 
     def make_room(self) -> None:
         """Sees to it that a step's nodes fit into the tree."""
@@ -180,20 +213,21 @@ class Session:
         body = self.body
         if procedure.tool is not None:
             body = body_of(params, self.clearance, self.accuracy)
-        if procedure.kind == ENTRY:
-            start = np.array([0.0, 0.0, self.volume.depth - params.tool_radius])
-        else:
-            start = np.array(procedure.position, float)
+        own, start = self._in_entry(procedure, params)
         clearance = self.volume.channel - params.body_radius
         refusal = check_jam(procedure, clearance, params) or check_reach(
-            procedure, start, params
+            own, start, params
         )
         if refusal:
+            if refusal.where is not None:
+                refusal.where = (self.X_WE @ [*refusal.where, 1.0])[:3].tolist()
             return refusal
-        n, s = procedure.axis(), self.volume.space()
+        R_WE, o = self.X_WE[:3, :3], self.X_WE[:3, 3]
+        n, s = R_WE @ own.axis(), self.volume.space()
         x = np.empty(7)
-        O2 = start - (params.straight_module + params.tool_offset) * n
-        tips = tips_of(procedure, start, params)
+        O2 = R_WE @ start + o - (params.straight_module + params.tool_offset) * n
+        tips = tips_of(own, start, params) @ R_WE.T + o
+        start = R_WE @ start + o
         status = posture_at(body, O2, n, x)
         if status == OK:
             status = self._approach(s, body, x)
@@ -225,14 +259,28 @@ class Session:
         text = f"feasible: removes {1e9 * gained:.0f} mm3 in {poses} poses"
         return Answer(True, text=text, gained=gained, poses=poses)
 
+    def _in_entry(
+        self, procedure: Procedure, params: SnakeParams
+    ) -> tuple[Procedure, NDArray[np.float64]]:
+        """A procedure as the entry's frame has it, and where its tool starts there."""
+        if procedure.position is None or procedure.direction is None:
+            return procedure, np.array(
+                [0.0, 0.0, self.volume.depth - params.tool_radius]
+            )
+        X_EW = np.linalg.inv(self.X_WE)
+        start = X_EW[:3, :3] @ np.array(procedure.position) + X_EW[:3, 3]
+        axis = X_EW[:3, :3] @ np.array(procedure.direction)
+        own = replace(procedure, position=start.tolist(), direction=axis.tolist())
+        return own, start
+
     def _approach(self, s: Space, body: Body, x: NDArray[np.float64]) -> int:
         """Drives to a posture from the nearest node that has a free way to it."""
         c = np.empty((POINTS, 3))
-        corners(x, body.h, body.tool, c)
+        place(body, x, c)
         found, far = np.empty(STARTS, np.int64), np.empty(STARTS)
         nearest_nodes(self.tree, c[7], found, far)
         blamed, best, status = None, -1.0, LIMIT
-        for node in [0, *found[found >= 0].tolist()]:
+        for node in [int(self.tree.size[2]), *found[found >= 0].tolist()]:
             freed, roomed = int(s.used[0]), int(s.used[1])
             new = extend(s, body, self.tree, int(node), x, self.why)
             if new >= 0:
@@ -269,8 +317,59 @@ class Session:
         """Appends the way back into the channel."""
         before = self.standing()
         self.make_room()
-        go_to(self.volume.space(), self.body, self.tree, 0, self.why)
+        home = int(self.tree.size[2])
+        go_to(self.volume.space(), self.body, self.tree, home, self.why)
         self.record("home", "home", before)
+
+    def enter_anew(self, X_WE: NDArray[np.float64], name: str = "") -> Step:
+        """Withdraws the robot and sets it at the end of another channel.
+
+        Args:
+            X_WE: The channel's frame: as W it has z along the channel, which ends at
+                the volume's depth along that.
+            name: Of the step.
+
+        Raises:
+            ValueError: If the channel comes too near to what is critical.
+        """
+        if self.steps and self.steps[-1].kind != "home":
+            self.go_home()
+        before = self.standing()
+        visit_ = int(self.tree.size[1])
+        self.volume.bore(Channel(np.array(X_WE, float), self.volume.depth, visit_))
+        self.stand()
+        self.make_room()
+        tree, c = self.tree, np.empty((POINTS, 3))
+        place(self.body, self.home, c)
+        node = int(tree.size[0])
+        tree.x[node], tree.tip[node] = self.home, c[7]
+        tree.parent[node], tree.depth[node] = -1, 0
+        tree.route[visit_] = node
+        tree.size[:] = node + 1, visit_ + 1, node
+        enlist_all(tree)
+        name = name or f"entry {1 + len(self.volume.more)}"
+        return self.record(name, ACCESS, before)
+
+    def thought(self) -> "Session":
+        """The same as it stands now, to be gone on with without consequence."""
+        other = Session(
+            self.volume.thought(), self.params, self.clearance, self.accuracy
+        )
+        other.tree = copied(self.tree, ROOM, 4 * ROOM)
+        other.steps = list(self.steps)
+        other.stand()
+        return other
+
+    def adopt(self, thought: "Session") -> None:
+        """Makes what was done in thought part of the plan, and saves it."""
+        self.volume.tau[:] = thought.volume.tau
+        self.volume.more = thought.volume.more
+        self.volume.allow()
+        self.volume.refresh()
+        self.stand()
+        self.tree, self.steps = thought.tree, thought.steps
+        self.concluded = ""
+        self.save_if_filed()
 
     # What comes of it --------------------------------------------------------
 
@@ -299,7 +398,7 @@ class Session:
     def save(self, path: Path) -> None:
         """Writes the session; the file before it is kept as `*.before`."""
         v, t = self.volume, self.tree
-        nodes, visits = map(int, t.size)
+        nodes, visits, home = map(int, t.size)
         arrays = {
             "labels": v.labels,
             "origin": v.origin,
@@ -326,6 +425,11 @@ class Session:
             "params": asdict(self.params),
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
+            "home": home,
+            "more": [
+                {"X_WE": c.X_WE.tolist(), "depth": c.depth, "time": c.time}
+                for c in v.more
+            ],
         }
         write_archive(path, meta, arrays)
 
@@ -354,17 +458,24 @@ def load_session(path: Path) -> Session:
         Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
         mask_volume=meta["mask_volume"],
         notes=meta["notes"],
+        more=[
+            Channel(np.array(row["X_WE"]), row["depth"], row["time"])
+            for row in meta["more"]
+        ],
     )
     session = Session(
         volume, SnakeParams(**meta["params"]), meta["clearance"], meta["accuracy"]
     )
-    nodes, visits = len(arrays["x"]), len(arrays["route"])
-    tree = grown(session.tree, nodes, visits)
-    for name in ("x", "parent", "depth", "tip"):
-        getattr(tree, name)[:nodes] = arrays[name]
-    tree.route[:visits] = arrays["route"]
-    tree.size[:] = nodes, visits
-    session.tree = tree
+    session.tree = tree_of(
+        arrays["x"],
+        arrays["parent"],
+        arrays["depth"],
+        arrays["tip"],
+        arrays["route"],
+        meta["home"],
+        ROOM,
+        ROOM,
+    )
     for row in meta["steps"]:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from plants.snake.inverse_kernels import REACHED, solve_positioning
-from plants.snake.kinematics import POINTS, corners, link_axis
+from plants.snake.kinematics import POINTS, link_axis
 from plants.snake.posture import module_angles
-from plants.snake.snake_body import OK, Body
+from plants.snake.snake_body import OK, Body, axis_from_entry, from_entry, place
 from plants.tissue.space import Space, roll_back
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import Vector, along, norm, sub, unit, xyz
-from systems.resection.planning.tree import Tree, extend, go_to, here, visit
+from systems.resection.planning.tree import Tree, cut, extend, go_to, here, visit
 
 LIMIT = 5
 """Status of a pose that the inverse kinematics does not reach."""
@@ -152,14 +152,15 @@ def intermediate(b: Body, x: Any) -> tuple[Vector, Vector]:
     """O2 and the axis there, of a posture (7,)."""
     c, straight = np.empty((POINTS, 3)), x.copy()
     straight[5] = straight[6] = 0.0
-    corners(straight, b.h, b.tool, c)
+    place(b, straight, c)
     return xyz(c[4], 0), link_axis(c, 4, b.h)
 
 
 @compiled
 def posture_at(b: Body, p: Numbers, n: Numbers, x: Any) -> int:
     """The posture with O2 at p, axis n and a straight last module, into x (7,)."""
-    status = solve_positioning(p, n, b.h, b.bend, (b.low, b.high), x)
+    q, u = from_entry(b, p), axis_from_entry(b, n)
+    status = solve_positioning(q, u, b.h, b.bend, (b.low, b.high), x)
     x[5] = x[6] = 0.0
     return OK if status == REACHED else LIMIT
 
@@ -261,5 +262,5 @@ def try_procedure(
         sweep_procedure(s, b, t, n, length, spacing, widest, pitch, False, why)
         gain = s.used[0] - freed
     roll_back(s, freed, roomed)
-    t.size[0], t.size[1] = nodes, visits
+    cut(t, nodes, visits)
     return gain
