@@ -120,11 +120,13 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
     assert importers(
         arrows, f"{planning}.planner", f"{planning}.reach", f"{planning}.access"
     ) == {
+        "diagrams.keyhole.access",
         "diagrams.resection.console",
         "diagrams.resection.operation",
         "diagrams.resection.scenario",  # the planner's parameters
     }
     assert importers(arrows, "diagrams.resection.operation") == {
+        "diagrams.keyhole.access",
         "diagrams.keyhole.operation",
         "diagrams.resection.console",
         "diagrams.resection.diagram",  # the case's type

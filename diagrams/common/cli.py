@@ -32,6 +32,7 @@ examples:
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
   trocar import FILE --kind jigsaws         another's recording as one of ours
+  trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
 """
 
@@ -124,6 +125,19 @@ def make_parser() -> argparse.ArgumentParser:
         "pattern", metavar="PATTERN", nargs="?", default="", help="part of the key"
     )
     keys.add_argument("--json", action="store_true", help="for programs")
+    access = commands.add_parser(
+        "access",
+        help="propose entries and trocars of a keyhole operation",
+        description="Tries entries through the scenario's trocar, and trocars on the "
+        "wall; a table, and a picture in FILE.",
+    )
+    access.add_argument("name", metavar="NAME", help="a keyhole scenario")
+    access.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/NAME.access.png"
+    )
+    access.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
     resect = commands.add_parser(
         "resect",
         help="plan a resection by hand, line by line",
@@ -377,6 +391,26 @@ def keys_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def access_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar access`."""
+    from diagrams.common.plots import save_figure
+    from diagrams.keyhole.access import draw, find_ways, table
+    from diagrams.studies import load_scenario
+
+    scenario = load_scenario(arguments.name, arguments.overrides)
+    if scenario.system != "keyhole":
+        raise ScenarioError(f"{arguments.name!r} is no keyhole operation")
+    with progress_bar("entries and trocars", "tried") as show:
+        ways = find_ways(scenario, lambda share: show(share, 1.0))
+    name = default_name(arguments.name)
+    out = arguments.out or Path("out") / f"{name}.access.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(draw(ways), out)
+    print(table(ways))
+    print(out)
+    return 0
+
+
 def resect_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar resect`."""
     from diagrams.resection.console import run_console
@@ -420,6 +454,7 @@ COMMANDS = {
     "completion": completion_command,
     "diagram": diagram_command,
     "keys": keys_command,
+    "access": access_command,
     "resect": resect_command,
     "campaign": campaign_command,
     "import": import_command,
