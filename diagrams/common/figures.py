@@ -52,8 +52,10 @@ FIGURES = {
     "time_over_limit": Figure("s", "with the force over the limit"),
     "rms_estimate_error": Figure("m", "of the estimated fulcrum, rms"),
     "rms_lateral_estimate_error": Figure("m", "the same, across the shaft"),
+    "rms_depth_estimate_error": Figure("m", "the same, along the shaft"),
+    "probe_peak_force": Figure("N", "greatest before the figures start"),
     "fulcrum_convergence_time": Figure(
-        "s", "until the estimate is within 1 mm to stay"
+        "s", "from the start until the estimate is within 1 mm to stay"
     ),
     "lateral_convergence_time": Figure("s", "the same, across the shaft"),
     "depth_convergence_time": Figure("s", "the same, along the shaft"),
@@ -99,6 +101,7 @@ FIGURES = {
     "tumour_volume": Figure("m3", "as operated on"),
     "mask_volume": Figure("m3", "of the mask itself"),
     "cap_volume": Figure("m3", "of the tumour that the channel takes"),
+    "channel_volume": Figure("m3", "of brain that the channels bore, on the grid"),
     "reachable_fraction": Figure("%", "of the tumour that can be reached"),
     "planned_fraction": Figure("%", "of the tumour that the plan takes"),
     "resected_fraction": Figure("%", "of the tumour that was taken"),

@@ -87,12 +87,14 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
     wires = [
         ("tracker_noise.output", "optical_tracker.noise"),
         ("endoscope.shaft", f"posed_tools.{scenario.camera.name}"),
+        ("endoscope.shaft", f"clearance.{scenario.camera.name}"),
     ]
     for name, tool in hands(scenario.tools, scenario.seed).items():
         wires += [
             (f"{name}_tool.shaft", f"optical_tracker.{name}"),
             (f"optical_tracker.{name}_measured", f"{name}_estimator.measurement"),
             (f"{name}_tool.shaft", f"posed_tools.{name}"),
+            (f"{name}_tool.shaft", f"clearance.{name}"),
         ]
         if tool.hunt.speed:
             wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))

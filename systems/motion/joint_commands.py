@@ -368,6 +368,8 @@ class JointCommands(Block):
 
     Port ``posture`` emits the commanded `Posture`.
 
+    Port ``next`` emits that of the next instant.
+
     Port ``status`` emits the `Status`.
     """
 
@@ -408,9 +410,18 @@ class JointCommands(Block):
         for (name, signal), state in zip(signals.items(), start, strict=True):
             self.state_out(name, signal, flat(state))
         self.DeclareDiscreteState(1)  # s that it stays limp
-        self.update_every(params.period, self._update)
+        ports = (self._tool, self._fulcrum, self._measured, self._permission)
+        reads = {self.xd_ticket(), self.time_ticket(), *(p.ticket() for p in ports)}
+        self._next = self.cached("next", self._calc_next, reads)
+        self.signal_out(
+            "next",
+            Posture,
+            lambda context: self._next.Eval(context)[0],
+            {self._next.ticket()},
+        )
+        self.update_every(params.period, self._next.Eval)
 
-    def _update(self, context: Any) -> Sequence[Any]:
+    def _calc_next(self, context: Any) -> Sequence[Any]:
         q = context.get_discrete_state(0).value()
         rest = context.get_discrete_state(3).value()
         tool, time = self._tool.Eval(context), context.get_time()

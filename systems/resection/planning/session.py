@@ -217,9 +217,9 @@ class Session:
             body = body_of(params, self.clearance, self.accuracy)
         own, start = self._in_entry(procedure, params)
         clearance = self.volume.channel - params.body_radius
-        refusal = check_jam(procedure, clearance, params) or check_reach(
-            own, start, params
-        )
+        refusal = check_jam(
+            procedure, clearance, params, self.clearance, self.accuracy
+        ) or check_reach(own, start, params)
         if refusal:
             if refusal.where is not None:
                 refusal.where = (self.X_WE @ [*refusal.where, 1.0])[:3].tolist()

@@ -17,15 +17,15 @@ from tests.runs import run
 
 def test_arcs_about_a_wrong_guess():
     figures = run("pwe_arc").metrics
-    assert figures["fulcrum_convergence_time"] <= 2.0
+    assert 5.0 < figures["fulcrum_convergence_time"] <= 7.0  # the arcs begin at 5
     assert figures["rms_lateral_force"] <= 0.1
-    assert figures["lateral_convergence_time"] <= 0.5
+    assert figures["lateral_convergence_time"] <= 5.5
     assert figures["estimates_refused"] == 0
 
 
 def test_arcs_under_breathing():
     figures = run("pwe_arc_breathing").metrics
-    assert figures["fulcrum_convergence_time"] <= 10.0
+    assert 5.0 < figures["fulcrum_convergence_time"] <= 10.0
     assert figures["fulcrum_error_3s"] <= 2e-3
     assert figures["rms_lateral_force"] <= 0.1
     assert figures["breathing_rate_estimate"] == pytest.approx(0.2, rel=0.02)
