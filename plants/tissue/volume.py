@@ -19,7 +19,7 @@ from scipy import ndimage
 from plants.tissue.critical import Boxes, cover
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID, Space, as_bits, journals
-from plants.tissue.tissue import Tissue, parts_by_size, signed_distance
+from plants.tissue.tissue import Grid, Tissue, parts_by_size, signed_distance
 from systems.common.parameter import Rules, check, parameter
 
 Vector = NDArray[np.float64]
@@ -89,6 +89,7 @@ class Volume:
         mask_volume: Of the tumour as the mask has it, in m3; None if it is synthetic.
         notes: What was left out on the way here.
         more: Channels beside the first, in the order in which they are bored.
+        image: The grid on which the tissue was given; None if it is not known.
     """
 
     labels: NDArray[np.uint8]
@@ -106,6 +107,7 @@ class Volume:
     mask_volume: float | None = None
     notes: list[str] = field(default_factory=list)
     more: list[Channel] = field(default_factory=list)
+    image: Grid | None = None
     inside: NDArray[np.float32] = field(init=False, repr=False)
     roomy: NDArray[np.uint8] = field(init=False, repr=False)
     solid: NDArray[np.int64] = field(init=False, repr=False)
@@ -396,6 +398,7 @@ def make_volume(
         to_critical=to_critical,
         mask_volume=body.tumour_volume if body.is_mask else None,
         notes=notes,
+        image=body.grid,
     )
 
 

@@ -11,6 +11,7 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
+from plants.tissue.tissue import Grid
 from plants.tissue.volume import Channel, Volume
 from systems.common.archive import read_archive, write_archive
 from systems.common.parameter import check
@@ -426,6 +427,8 @@ class Session:
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
             "home": home,
+            "image": v.image
+            and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
             "more": [
                 {"X_WE": c.X_WE.tolist(), "depth": c.depth, "time": c.time}
                 for c in v.more
@@ -458,6 +461,8 @@ def load_session(path: Path) -> Session:
         Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
         mask_volume=meta["mask_volume"],
         notes=meta["notes"],
+        image=meta["image"]
+        and Grid(tuple(meta["image"]["sizes"]), np.array(meta["image"]["X_PI"])),
         more=[
             Channel(np.array(row["X_WE"]), row["depth"], row["time"])
             for row in meta["more"]
