@@ -22,6 +22,11 @@ setup: .venv/ready
 
 demo: setup
 	$(BIN)/trocar run gauze_dynamic
+	@echo
+	@echo "Open out/gauze_dynamic/replay.html in a browser, and report.html beside it. Then try:"
+	@echo "  $(BIN)/trocar run gauze_dynamic --set behaviour=field --out out/field"
+	@echo "  $(BIN)/trocar compare out/gauze_dynamic out/field"
+	@echo "  $(BIN)/trocar scenarios"
 
 test: setup
 	$(BIN)/ruff check .

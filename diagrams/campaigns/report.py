@@ -5,7 +5,6 @@ variants are compared on the same draws (McNemar), and what was drawn is ranked 
 differently it is spread among failures (Kolmogorov and Smirnov).
 """
 
-import base64
 from collections import Counter
 from collections.abc import Iterable
 from html import escape
@@ -29,17 +28,9 @@ from diagrams.campaigns.statistics import (
     share_interval,
     upper_bound,
 )
+from diagrams.common.report import image, page
 from systems.common.archive import whole
 
-STYLE = """
-body {font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
-      padding: 0 1rem; color: #222}
-table {border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums}
-th, td {padding: .25rem .8rem; text-align: right; border-bottom: 1px solid #ddd}
-th:first-child, td:first-child {text-align: left}
-code, pre {background: #f4f4f4; padding: .1rem .3rem; font-size: .9em}
-img {max-width: 100%} h2 {margin-top: 2.5rem} .note {color: #666}
-"""
 _WORST = 10
 _FEWEST = 5
 """Failures below which nothing is said about what explains them."""
@@ -64,7 +55,7 @@ def write_report(campaign: Campaign, rows: Rows, out: Path, base: Any) -> Path:
     with whole(out / "summary.json") as draft:
         draft.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
     parts = [
-        f"<h1>{escape(out.name)}</h1><p>{escape(campaign.description)}</p>",
+        f"<p>{escape(campaign.description)}</p>",
         f"<p class=note>Scenario <code>{escape(campaign.scenario or campaign.act)}"
         f"</code>, seed {campaign.seed}, code <code>{fingerprint()}</code>.</p>",
         *_shares(campaign, by),
@@ -77,12 +68,8 @@ def write_report(campaign: Campaign, rows: Rows, out: Path, base: Any) -> Path:
         escape((out / "campaign.yaml").read_text(encoding="utf-8")),
         "</pre>",
     ]
-    page = (
-        "<!doctype html><html lang=en><meta charset=utf-8>"
-        f"<title>{escape(out.name)}</title><style>{STYLE}</style>{''.join(parts)}</html>"
-    )
     with whole(out / "report.html") as draft:
-        draft.write_text(page, encoding="utf-8")
+        draft.write_text(page(out.name, parts), encoding="utf-8")
     return out / "report.html"
 
 
@@ -237,10 +224,7 @@ def histograms(names: list[str], by: dict[str, Rows]) -> Figure:
 def _image(figure: Figure) -> str:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110, metadata={"Software": None})
-    return (
-        f'<img src="data:image/png;base64,'
-        f'{base64.b64encode(buffer.getvalue()).decode()}" alt="histograms">'
-    )
+    return image(buffer.getvalue(), "histograms")
 
 
 def _pairs(by: dict[str, Rows]) -> list[str]:

@@ -2,24 +2,38 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
+import fnmatch
+import json
 import logging
+import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from diagrams.common.progress import progress_bar
-from diagrams.common.scenario import ScenarioError, scenario_files
+from diagrams.common.scenario import ScenarioError, nearest, scenario_files
 from diagrams.common.tree import read_tree
+
+IMPORTED = ("jigsaws", "dvrk", "plus", "csv", "breathing", "crowd")
+"""Kinds of recordings that can be imported."""
 
 EXAMPLES = """\
 examples:
   trocar scenarios                          what there is to run
   trocar run gauze_dynamic                  results in out/gauze_dynamic
+  trocar run 'pwe_*' nav_crowd              several, one after the other
+  trocar live gauze_dynamic                 take part, in the browser
+  trocar replay out/gauze_dynamic           opens the replay in the browser
+  trocar compare out/gauze_static out/printed
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
   trocar export out/resect_paper.session --to viewer   what a viewer can load
+  trocar import FILE --kind jigsaws         another's recording as one of ours
+  trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
 """
 
@@ -32,6 +46,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action=Version, nargs=0, help="version and commit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("scenarios", help="list the scenarios, one line each")
     run = commands.add_parser(
@@ -40,8 +55,13 @@ def make_parser() -> argparse.ArgumentParser:
         description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
         "PNG, replay.html and scenario.yaml (exactly what ran) into DIR.",
     )
-    run.add_argument("name", metavar="NAME", help="a scenario's name or its file")
-    run.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
+    run.add_argument(
+        "names", metavar="NAME", nargs="+", help="a scenario's name, pattern or file"
+    )
+    run.add_argument(
+        "--out", metavar="DIR", type=Path, help="default: out/NAME; of several DIR/NAME"
+    )
+    run.add_argument("--json", action="store_true", help="print the figures as JSON")
     run.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
     run.add_argument(
         "--set",
@@ -55,6 +75,42 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--no-replay", action="store_true", help="do not record replay.html"
     )
+    compare = commands.add_parser(
+        "compare", help="two runs side by side: figures, and signals over each other"
+    )
+    compare.add_argument("one", metavar="DIR", type=Path, help="results of a run")
+    compare.add_argument("other", metavar="DIR", type=Path, help="of another")
+    compare.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/compare.png"
+    )
+    live = commands.add_parser(
+        "live",
+        help="run a gauze scenario in real time and take part in the browser",
+        description="Runs a gauze scenario in real time: the surgeon's tools follow "
+        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
+        "target; space: pause). What the hands did is kept as recordings, and run "
+        "again at the end for figures and replay.",
+    )
+    live.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")
+    live.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    live.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
+    live.add_argument("--duration", type=float, metavar="S", help="default: 600 s")
+    live.add_argument("--out", metavar="DIR", type=Path, help="default: out/live")
+    live.add_argument(
+        "--host", default="localhost", help="where it listens; '*' for everyone"
+    )
+    replay = commands.add_parser("replay", help="open a run's replay in the browser")
+    replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
+    shell = commands.add_parser(
+        "completion",
+        help="print a shell's completion script",
+        description="Prints a completion script: "
+        "trocar completion bash > ~/.local/share/bash-completion/completions/trocar",
+    )
+    shell.add_argument("shell", choices=("bash", "zsh", "tcsh"))
     draw = commands.add_parser("diagram", help="draw a scenario's block diagram")
     draw.add_argument("name", metavar="NAME", help="a scenario's name or its file")
     draw.add_argument(
@@ -70,6 +126,19 @@ def make_parser() -> argparse.ArgumentParser:
         "pattern", metavar="PATTERN", nargs="?", default="", help="part of the key"
     )
     keys.add_argument("--json", action="store_true", help="for programs")
+    access = commands.add_parser(
+        "access",
+        help="propose entries and trocars of a keyhole operation",
+        description="Tries entries through the scenario's trocar, and trocars on the "
+        "wall; a table, and a picture in FILE.",
+    )
+    access.add_argument("name", metavar="NAME", help="a keyhole scenario")
+    access.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/NAME.access.png"
+    )
+    access.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
     resect = commands.add_parser(
         "resect",
         help="plan a resection by hand, line by line",
@@ -96,6 +165,7 @@ def make_parser() -> argparse.ArgumentParser:
     export.add_argument(
         "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
     )
+    add_import(commands)
     campaign = commands.add_parser(
         "campaign",
         help="run a scenario many times, varied, and say how sure the answer is",
@@ -122,6 +192,43 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def add_import(commands: Any) -> None:
+    """Adds `trocar import` to a parser's commands."""
+    parser = commands.add_parser(
+        "import",
+        help="make the project's own file of another's recording",
+        description="Reads a recording, says what it holds, and writes a CSV (of a "
+        "crowd: a scenario). Nothing of it is kept elsewhere.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument("--kind", choices=IMPORTED, required=True)
+    parser.add_argument("--out", metavar="FILE", type=Path, help="default: out/STEM.*")
+    parser.add_argument(
+        "--place",
+        metavar="X,Y,Z",
+        default="0,0,-0.11",
+        help="of the motion's mean in W [m]",
+    )
+    parser.add_argument(
+        "--yaw", type=float, default=0.0, help="turn about the vertical [deg]"
+    )
+    parser.add_argument(
+        "--arm",
+        default="",
+        help="jigsaws: master_left ... slave_right; plus: its transform, e.g. "
+        "ProbeToTracker; breathing: the column",
+    )
+    parser.add_argument(
+        "--rate", type=float, default=100.0, help="breathing: samples a second"
+    )
+    parser.add_argument(
+        "--start", type=float, default=0.0, help="crowd: first second of it"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=40.0, help="crowd: how long [s]"
+    )
+
+
 def list_scenarios(arguments: argparse.Namespace) -> int:
     """Runs `trocar scenarios`: every scenario's name and description."""
     files = scenario_files()
@@ -139,20 +246,58 @@ def default_name(name: str) -> str:
     return path.stem
 
 
+def find_names(patterns: Sequence[str]) -> list[str]:
+    """Names and files as they are; a pattern becomes the names that match it.
+
+    Raises:
+        ScenarioError: If a pattern matches none.
+    """
+    names: list[str] = []
+    for pattern in patterns:
+        is_pattern = set("*?[") & set(pattern) and not Path(pattern).exists()
+        found = fnmatch.filter(scenario_files(), pattern) if is_pattern else [pattern]
+        if not found:
+            raise ScenarioError(
+                f"no scenario matches {pattern!r}: {nearest(pattern, scenario_files())}"
+            )
+        names += [name for name in found if name not in names]
+    return names
+
+
 def run_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar run`."""
-    from diagrams.common.metrics import table
+    names = find_names(arguments.names)
+    codes = []
+    for name in names:
+        out = arguments.out or Path("out")
+        if len(names) > 1 or not arguments.out:
+            out /= default_name(name)
+        if len(names) > 1 and not arguments.json:
+            print(f"\n{name}")
+        codes.append(run_one(arguments, name, out))
+    return max(codes)
+
+
+def run_one(arguments: argparse.Namespace, name: str, out: Path) -> int:
+    """Runs a scenario and prints its figures."""
+    from diagrams.common.figures import table
     from diagrams.common.run import run_scenario
     from diagrams.studies import load_scenario
 
     scenario = load_scenario(
-        arguments.name, arguments.overrides, arguments.seed, arguments.duration
+        name, arguments.overrides, arguments.seed, arguments.duration
     )
-    out = arguments.out or Path("out") / default_name(arguments.name)
     run = run_scenario(scenario, out, not arguments.no_replay, progress_bar)
-    if run.metrics:
-        print(table(run.metrics))
-    print(f"\n{', '.join(sorted(path.name for path in out.glob('[!.]*.*')))}: {out}/")
+    if arguments.json:
+        print(json.dumps(run.metrics, indent=2))
+    else:
+        if run.metrics:
+            print(table(run.metrics))
+        print(
+            f"\n{', '.join(sorted(path.name for path in out.glob('[!.]*.*')))}: {out}/"
+        )
+        if sys.stdout.isatty():
+            print(f"Look at {out / 'report.html'}, or: trocar replay {out}")
     if run.error:
         end = f"ended early at {run.simulated:.3f} s"
         print(
@@ -161,6 +306,81 @@ def run_command(arguments: argparse.Namespace) -> int:
         )
         return 1
     return 0
+
+
+def compare_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar compare`."""
+    from diagrams.common.compare import overlay, read, table
+    from diagrams.common.plots import save_figure
+
+    folders = (arguments.one, arguments.other)
+    (one, first), (other, second) = map(read, folders)
+    names = (str(arguments.one), str(arguments.other))
+    print(table(one, other, names))
+    out = arguments.out or Path("out") / "compare.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(overlay(first, second, names), out)
+    print(out)
+    return 0
+
+
+def live_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar live`."""
+    import webbrowser
+
+    from diagrams.common.figures import table
+    from diagrams.common.replay import start_meshcat
+    from diagrams.common.run import run_scenario
+    from diagrams.live.session import Session
+    from diagrams.studies import load_scenario
+
+    if not 0.0 < arguments.speed <= 20.0:
+        raise ScenarioError(f"--speed {arguments.speed}: expected > 0 and <= 20")
+    scenario = load_scenario(arguments.name, arguments.overrides, arguments.seed)
+    out = arguments.out or Path("out") / "live"
+    meshcat = start_meshcat(arguments.host)
+    session = Session(scenario, meshcat)
+    print(f"{meshcat.web_url()}  (Ctrl-C ends it and keeps what was done)")
+    webbrowser.open(meshcat.web_url())
+    with suppress(KeyboardInterrupt):
+        session.play(arguments.duration or 600.0, arguments.speed)
+    run = run_scenario(session.save(out), out, progress=progress_bar)
+    print(table(run.metrics))
+    print(f"\n{out}/: trocar replay {out}, trocar run {out / 'scenario.yaml'}")
+    return 1 if run.error else 0
+
+
+def replay_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar replay`."""
+    import webbrowser
+
+    page = arguments.folder / "replay.html"
+    if not page.is_file():
+        raise ScenarioError(
+            f"{str(page)!r}: no such file; `trocar run` writes it without --no-replay"
+        )
+    webbrowser.open(page.resolve().as_uri())
+    print(page)
+    return 0
+
+
+def completion_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar completion`."""
+    import shtab
+
+    print(shtab.complete(make_parser(), arguments.shell))
+    return 0
+
+
+class Version(argparse.Action):
+    """Prints the version and the commit, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *more: object) -> None:
+        """Called for `--version`."""
+        from diagrams.common.provenance import commit, release
+
+        print(" ".join(filter(None, ["trocar", release(), commit()])))
+        parser.exit()
 
 
 def diagram_command(arguments: argparse.Namespace) -> int:
@@ -182,6 +402,26 @@ def keys_command(arguments: argparse.Namespace) -> int:
 
     found = matching(load_scenario(arguments.name), arguments.pattern)
     print(as_json(found) if arguments.json else as_text(found))
+    return 0
+
+
+def access_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar access`."""
+    from diagrams.common.plots import save_figure
+    from diagrams.keyhole.access import draw, find_ways, table
+    from diagrams.studies import load_scenario
+
+    scenario = load_scenario(arguments.name, arguments.overrides)
+    if scenario.system != "keyhole":
+        raise ScenarioError(f"{arguments.name!r} is no keyhole operation")
+    with progress_bar("entries and trocars", "tried") as show:
+        ways = find_ways(scenario, lambda share: show(share, 1.0))
+    name = default_name(arguments.name)
+    out = arguments.out or Path("out") / f"{name}.access.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(draw(ways), out)
+    print(table(ways))
+    print(out)
     return 0
 
 
@@ -225,14 +465,28 @@ def campaign_command(arguments: argparse.Namespace) -> int:
     return command.campaign_command(arguments)
 
 
+def import_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar import`."""
+    from diagrams.common.importing import import_file
+
+    import_file(arguments)
+    return 0
+
+
 COMMANDS = {
     "scenarios": list_scenarios,
     "run": run_command,
+    "compare": compare_command,
+    "live": live_command,
+    "replay": replay_command,
+    "completion": completion_command,
     "diagram": diagram_command,
     "keys": keys_command,
+    "access": access_command,
     "resect": resect_command,
     "export": export_command,
     "campaign": campaign_command,
+    "import": import_command,
 }
 
 
@@ -250,6 +504,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ScenarioError as error:
         print(f"trocar: error: {error}", file=sys.stderr)
         return 2
+    except BrokenPipeError:  # `trocar keys ... | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except Exception as error:
         if sys.flags.dev_mode:  # `python -X dev -m diagrams` shows where
             raise

@@ -31,6 +31,8 @@ from diagrams.common.log import (
 )
 from diagrams.common.plots import save_figure
 from diagrams.common.progress import Progress, Show, progress_of, silent
+from diagrams.common.provenance import provenance
+from diagrams.common.report import run_page
 from diagrams.common.results import Results, results, save_scenario
 from diagrams.common.scenario import ScenarioError, refusals
 from diagrams.common.study import Study
@@ -285,9 +287,9 @@ def run_scenario(
     """Runs a scenario and writes all its results into a folder.
 
     Writes `scenario.yaml` with the files that it names, `signals.csv`,
-    `metrics.json`, the plots as PNG and `replay.html`, in this order, so that nothing
-    computed is lost if a later one fails. What an earlier run left there stays until
-    this one begins, and then goes.
+    `metrics.json`, the plots as PNG, `replay.html`, `provenance.json` and
+    `report.html`, in this order, so that nothing computed is lost if a later one
+    fails. What an earlier run left there stays until this one begins, and then goes.
 
     Raises:
         ScenarioError: If the scenario cannot run, the folder not be written, or
@@ -319,6 +321,7 @@ def run_scenario(
                     meshcat.SetProperty(f"/{replay.FAR}", "visible", False)
                     with into.file("close_up.html") as draft:
                         draft.write_text(meshcat.StaticHtml())
+            write_page(run, into)
     return run
 
 
@@ -332,3 +335,12 @@ def write(run: Run, into: Results) -> None:
     for name, figure in figures.items():
         with into.file(f"{name}.png") as draft:
             save_figure(figure, draft)
+
+
+def write_page(run: Run, into: Results) -> None:
+    """Writes what made the run, and its page with all that was written before."""
+    made_by = provenance()
+    with into.file("provenance.json") as draft:
+        draft.write_text(json.dumps(made_by, indent=2) + "\n")
+    with into.file("report.html") as draft:
+        draft.write_text(run_page(run, into.folder, made_by), encoding="utf-8")

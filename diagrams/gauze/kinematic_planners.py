@@ -234,10 +234,14 @@ FIELD: dict[str, Any] = {
     "go": GoToTargetParams(max_speed=SPEED),
     "arbiter": FuzzyArbiterParams(max_speed=SPEED),
 }
+DECISION = FuzzyArbiterParams(table="literal", velocity="v_R", max_speed=SPEED)
+"""Table I to the letter, on the current v_R of Figure 4."""
+WANTED = FuzzyArbiterParams(table="literal", max_speed=SPEED)
+"""The same on v_1."""
 PRINTED: dict[str, Any] = {
     "go": GoToTargetParams(form="printed", max_speed=SPEED),
     "backward": BackwardMovementParams(form="printed"),
-    "arbiter": FuzzyArbiterParams(table="literal", max_speed=SPEED),
+    "arbiter": DECISION,
 }
 PLANNERS: dict[str, Callable[[], Planner]] = {
     "bypass": lambda: Constrained(Bypass(**FIELD)),
@@ -245,6 +249,8 @@ PLANNERS: dict[str, Callable[[], Planner]] = {
     "bypass, no constraint": lambda: Bypass(**FIELD, field_only=True),
     "corrected field": lambda: LocalPlanner(**FIELD),
     "printed field": lambda: LocalPlanner(**PRINTED),
+    "literal on v_R": lambda: LocalPlanner(**FIELD | {"arbiter": DECISION}),
+    "literal on v_1": lambda: LocalPlanner(**FIELD | {"arbiter": WANTED}),
     "field + constraint": lambda: Constrained(LocalPlanner(**FIELD)),
     "field only": lambda: LocalPlanner(**FIELD, field_only=True),
 }

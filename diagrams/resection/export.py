@@ -61,7 +61,7 @@ def state(session: Session) -> NDArray[np.uint8]:
     file = session.file and beside(session.file, "executed")
     if file is not None and file.is_file():
         with refusals():
-            done = load_execution(file, session.postures)
+            done = load_execution(file, session.postures, tau.shape)
         tau = tau if done.tau is None else done.tau
     gone, tumour = tau != SOLID, volume.labels == TUMOUR
     bored = np.isin(volume.labels, (CHANNEL, CAP))

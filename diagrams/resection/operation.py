@@ -31,7 +31,7 @@ from systems.resection.planning.reach import (
     load_reach,
     save_reach,
 )
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.session import UPDATE, Session, load_session
 from systems.resection.wires.procedure_player import schedule
 
 LOG_PERIOD = 0.1
@@ -101,6 +101,40 @@ def new_session(
     return session, tissue.name
 
 
+def resumed(file: Path, fresh: Session) -> Session:
+    """The session of a file, which must be one of the same operation.
+
+    Args:
+        file: It is there.
+        fresh: The operation at its beginning.
+
+    Raises:
+        ScenarioError: If it is another's; what differs is named.
+        ValueError: If the file is damaged.
+    """
+    session = load_session(file)
+    old, new = session.volume, fresh.volume
+    updated = any(step.kind == UPDATE for step in session.steps)  # it shows another
+    same = old.labels.shape == new.labels.shape and (
+        updated or bool((old.labels == new.labels).all())
+    )
+    pairs = {"tumour or access": (bool(same), True), "margin": (old.margin, new.margin)}
+    pairs |= {
+        name: (getattr(session, name), getattr(fresh, name))
+        for name in ("clearance", "accuracy")
+    }
+    told = vars(session.params)
+    pairs |= {f"snake.{k}": (told[k], v) for k, v in vars(fresh.params).items()}
+    differs = [
+        f"{k} ({was} there, {is_now} here)"
+        for k, (was, is_now) in pairs.items()
+        if was != is_now
+    ]
+    if differs:
+        raise ScenarioError(f"session {str(file)!r} differs in {', '.join(differs)}")
+    return session
+
+
 def outline(scenario: ResectionScenario) -> Operation:
     """An operation of which nothing is planned, on a tumour that is quickly made."""
     access = Access(direction=[0.0, 0.0, -1.0])
@@ -123,11 +157,7 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
     session, tumour = new_session(scenario, progress)
     access_time = perf_counter() - start
     if file is not None and file.is_file():
-        fresh, session = session, load_session(file)
-        if session.volume.labels.shape != fresh.volume.labels.shape or (
-            (session.volume.labels != fresh.volume.labels).any()
-        ):
-            raise ScenarioError(f"session {str(file)!r} is of another tumour or access")
+        session = resumed(file, session)
     session.file = file
     reach = reach_of(session, scenario, progress)
     start = perf_counter()
@@ -153,7 +183,9 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
     planning_time = perf_counter() - start
     done = Execution()
     if file is not None:
-        done = load_execution(beside(file, "executed"), session.postures)
+        done = load_execution(
+            beside(file, "executed"), session.postures, session.volume.labels.shape
+        )
     return Operation(
         scenario,
         session=session,

@@ -184,8 +184,8 @@ def _figures(m: dict[str, Any]) -> str:
     critical, mask = m["min_critical_distance"], m["mask_volume"]
     rows = [
         f"tumour {1e6 * m['tumour_volume']:.2f} cm³ (without the channel's cap of "
-        f"{1e6 * m['cap_volume']:.2f} cm³)"
-        + (f", in the mask {1e6 * mask:.2f} cm³" if mask else ""),
+        f"{1e6 * m['cap_volume']:.2f} cm³; it bores {1e6 * m['channel_volume']:.2f} "
+        "cm³ of brain here)" + (f", in the mask {1e6 * mask:.2f} cm³" if mask else ""),
         f"reachable {100 * m['reachable_fraction']:.1f} %, planned "
         f"{100 * m['planned_fraction']:.1f} %, resected "
         f"{100 * m['resected_fraction']:.1f} % of the tumour",

@@ -138,6 +138,49 @@ class Volume:
             allowed &= self.to_critical > self.margin
         return allowed.astype(np.uint8)
 
+    def retarget(self, body: Tissue, seen: NDArray[np.bool_] | None = None) -> None:
+        """Takes over what is there now; what is gone stays gone, and counts as it did.
+
+        Args:
+            body: The tissue of an image taken meanwhile, of what is left.
+            seen: Voxels that a scan of the cavity found to be tissue, (nx, ny, nz):
+                they are there though they were thought to be gone.
+
+        Raises:
+            ValueError: If the tumour that is left lies beyond the grid.
+        """
+        X_WV = np.linalg.inv(self.X_PW) @ body.X_PV
+        place = body.points() @ np.linalg.inv(self.X_PW)[:3, :3].T
+        place += np.linalg.inv(self.X_PW)[:3, 3]
+        index = np.rint((place - self.origin) / self.spacing)
+        beyond = ~((index >= 0) & (index < self.labels.shape)).all(axis=1)
+        if beyond.any():
+            raise ValueError(
+                f"{body.name}: {100 * beyond.mean():.1f} % of its tumour lie beyond "
+                "the session's grid: expected the same tumour in the same frame"
+            )
+        size = np.array(self.labels.shape)
+        left = _tumour_on_grid(
+            body, np.linalg.inv(X_WV), self.origin, self.spacing, size
+        )
+        if seen is not None:
+            self.tau[seen & (self.tau > 0)] = SOLID
+        kept = np.isin(self.labels, (CHANNEL, CAP)) | (
+            (self.labels == TUMOUR) & (self.tau != SOLID)
+        )
+        labels = np.where(left, TUMOUR, BRAIN).astype(np.uint8)
+        if (body.labels == CRITICAL).any():
+            self.critical = Boxes(np.argwhere(body.labels == CRITICAL), X_WV)
+            covered, self.to_critical = cover(
+                self.critical, self.origin, self.spacing, self.labels.shape
+            )
+            labels[covered] = CRITICAL
+        else:
+            labels[self.labels == CRITICAL] = CRITICAL
+        self.labels = np.where(kept, self.labels, labels).astype(np.uint8)
+        self.allow()
+        self.refresh()
+
     def refresh(self) -> None:
         """Makes all that follows from arrival times agree with them."""
         self.forget_journals()

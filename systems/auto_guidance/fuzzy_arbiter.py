@@ -8,14 +8,14 @@ Axes of the quadrants (the paper names none; this reading fits all 16 cells): y
 points from M_R to M_O, x across y to the goal's side, quadrants 1 to 4
 counter-clockwise. Then A: both in the same quadrant, FA: they differ in x only,
 C: in y only, HC: in both. The memberships are cos^2 humps at 45, 135, 225 and
-315 degrees. The robot's velocity is v_1, where the robot wants to go: with v_R
-itself, a robot that gives way would look like one that goes along with the
-obstacle, and turn back. A robot at rest has no direction: it belongs to all
-quadrants. v_O is that of O's material point M_O.
+315 degrees. Figure 4 decides on the current v_R (`velocity=v_R`); by default it is
+v_1, where the robot wants to go: with v_R itself, a robot that gives way looks like
+one that goes along with the obstacle, and turns back. A robot at rest has no
+direction: it belongs to all quadrants. v_O is that of O's material point M_O.
 
 The printed table cannot tell an opposed pair that closes from one that parts
 (turn both velocities round). `literal` takes it as it is; `gated` lets it count
-only as far as the tools close.
+only as far as the tools close. The paper's own decision is `literal` on `v_R`.
 
 Weights: far off, and with A and FA, the field alone, (1, 0, 0). Nearer, C and HC
 add the corrections, (1, 1, 0), and next to the obstacle the backward movement,
@@ -106,6 +106,7 @@ WEIGHTS = {
 }
 
 TABLES = ("literal", "gated")
+VELOCITIES = ("v_1", "v_R")
 
 
 @dataclass
@@ -113,6 +114,9 @@ class FuzzyArbiterParams:
     """Parameters of `FuzzyArbiter`."""
 
     table: str = parameter("gated", "how Table I is read", choices=TABLES)
+    velocity: str = parameter(
+        "v_1", "the robot's velocity that Table I reads", choices=VELOCITIES
+    )
     period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
     distances: list[float] = parameter(
         [0.01, 0.025, 0.05],
@@ -195,6 +199,7 @@ def constants(params: FuzzyArbiterParams) -> np.ndarray:
     return packed(
         params,
         gated=params.table == "gated",
+        current=params.velocity == "v_R",
         table_i=table_i.cells,
         weight_table=weights.cells,
         weights=weights.values,
@@ -219,12 +224,12 @@ def label_weights(params: Any, labels: np.ndarray, distance: float) -> Weights:
 
 
 @compiled
-def decision(params: Any, v1: Vector, guide: Guide, obstacle: Estimate) -> Weights:
+def decision(params: Any, v: Vector, guide: Guide, obstacle: Estimate) -> Weights:
     """The weights for finite inputs and a known obstacle.
 
     Args:
         params: A record of `constants`.
-        v1: v_1, m/s.
+        v: The guide point's velocity that Table I reads, v_1 or v_R, m/s.
         guide: The guide point.
         obstacle: Of O.
     """
@@ -234,13 +239,13 @@ def decision(params: Any, v1: Vector, guide: Guide, obstacle: Estimate) -> Weigh
     if alert <= 0.0:
         return Weights(1.0, 0.0, 0.0)
     x, y = axes(guide)
-    r_y, o_y = dot(v1, y), dot(v_o, y)
+    r_y, o_y = dot(v, y), dot(v_o, y)
     if params.gated:
         alert *= min(1.0, max(0.0, (r_y - o_y) / params.closing_speed))
     if alert <= 0.0:
         return Weights(1.0, 0.0, 0.0)
     s = guide.s
-    labels = decision_labels(params, (dot(v1, x) / s, r_y / s), (dot(v_o, x), o_y))
+    labels = decision_labels(params, (dot(v, x) / s, r_y / s), (dot(v_o, x), o_y))
     c = label_weights(params, labels, guide.rho - params.contact_distance)
     return Weights(1.0 + alert * (c.c1 - 1.0), alert * c.c2, alert * c.c3)
 
@@ -304,7 +309,8 @@ def arbitrate(
         s = guide.s if is_there else 1.0
         change = limited(scaled(-1.0, v_tip), params.max_acceleration * dt)
         return Weights(0.0, 0.0, 0.0), plus(v_tip, change), s
-    weights = decision(params, v1, guide, obstacle)
+    seen = scaled(guide.s, v_tip) if params.current else v1
+    weights = decision(params, seen, guide, obstacle)
     v = commanded_velocity(params, v_tip, dt, weights, velocities, guide.s)
     return weights, v, guide.s
 

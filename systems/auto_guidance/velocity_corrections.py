@@ -82,7 +82,7 @@ class VelocityCorrectionsParams:
         shape=(6,),
     )
     horizon: float = parameter(
-        2.0,
+        3.0,
         "how far ahead O is predicted; a crossing in the last quarter counts in part",
         "s",
         above=0.0,
@@ -118,6 +118,9 @@ class VelocityCorrectionsParams:
             yield all(a < b for a, b in pairwise(values)), name, "increasing numbers"
         ends = (self.scales[0], self.scales[-1])
         yield ends == (0.0, 1.0), "scales", "0 at the start and 1 at the end"
+        # So that VL acts in full at its center.
+        enough = self.horizon >= 1.5 * self.times[-1]
+        yield enough, "horizon", f">= 1.5 times the last of times={self.times}"
 
 
 @compiled

@@ -90,7 +90,14 @@ def find_breathing(
     bend = before - 2.0 * at + after
     shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
     rate = float(rates[i] * (rates[i + 1] / rates[i]) ** shift)
-    basis = _basis(np.array([rate]), samples, period, harmonics)[0]
+    return fit_breathing(record, period, harmonics, rate)
+
+
+def fit_breathing(
+    record: np.ndarray, period: float, harmonics: int, rate: float
+) -> BreathingFit:
+    """Fits a periodic motion of a known rate to a record; see `find_breathing`."""
+    basis = _basis(np.array([rate]), len(record), period, harmonics)[0]
     x, *_ = np.linalg.lstsq(basis, record, rcond=None)
     fitted = basis[:, 1:] @ x[1:]
     rest = record - x[0] - fitted
@@ -98,6 +105,6 @@ def find_breathing(
     return BreathingFit(
         rate=rate,
         parts=np.sqrt(0.5 * (squares[0::2] + squares[1::2])),
-        amplitude=float(np.sqrt((fitted**2).sum() / samples)),
-        residual=float(np.sqrt((rest**2).sum() / samples)),
+        amplitude=float(np.sqrt((fitted**2).sum() / len(record))),
+        residual=float(np.sqrt((rest**2).sum() / len(record))),
     )

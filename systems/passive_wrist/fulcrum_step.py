@@ -2,7 +2,8 @@
 
 What it decides, and why, stands in `fulcrum_tracker`. All it remembers is one array z:
 x (n), P (n n), the record (120 entries), the sums for its next entry, the scalars
-named below, and each harmonic's rms in m when the breathing was found.
+named below, each harmonic's rms in m when the breathing was found, and the finer
+harmonics that the bank of waves knows.
 """
 
 from math import cos, exp, pi, sin, sqrt
@@ -11,10 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import across, along, dot, over, plus, scaled, sub, xyz
+from systems.common.geometry import (
+    across,
+    along,
+    dot,
+    norm,
+    over,
+    plus,
+    scaled,
+    sub,
+    xyz,
+)
 from systems.common.parameter import check
 from systems.common.signal import finiteness, reader, writer
 from systems.common.signals import Fulcrum, ShaftMotion, Wrench
+from systems.passive_wrist import steady as steadying
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_kernels import (
     LN_K,
@@ -30,6 +42,7 @@ from systems.passive_wrist.fulcrum_kernels import (
     update,
     write_entry,
 )
+from systems.passive_wrist.steady import leak, unbiased, unexplained
 
 Floats = np.ndarray
 
@@ -37,15 +50,16 @@ RECORD = 120
 """Entries of the record."""
 SCALARS = (
     *("phase", "steps", "unlikely", "guard", "nis", "recorded", "agreed", "found"),
-    *("jumps", "refused", "walk", "summed", "time", "due"),
+    *("jumps", "refused", "walk", "summed", "time", "due", "led", "wave"),
 )
 """Phase; steps so far; unlikely samples in a row; s of guard left after a jump; nis,
 smoothed normalised innovation squared / 4 (1 = as expected); entries recorded; looks in
 a row that agreed on a rate; the rate found, in Hz; jumps followed; estimates refused;
 walk of the mean once the wall is understood, in m/sqrt(s); samples summed; time of the
-last update in s; 1 if an entry was just added."""
+last update in s; 1 if an entry was just added; s for which the depth is still the
+bank's; the rate that the bank last took, in Hz."""
 (PHASE, STEPS, UNLIKELY, GUARD, NIS, RECORDED, AGREED, FOUND) = range(8)
-(JUMPS, REFUSED, WALK, SUMMED, TIME, DUE) = range(8, len(SCALARS))
+(JUMPS, REFUSED, WALK, SUMMED, TIME, DUE, LED, WAVE) = range(8, len(SCALARS))
 BEFORE, FOLLOWING, BREATHING = 0.0, 1.0, 2.0
 """Phases."""
 LEAST_BREATHING = 2e-4
@@ -58,6 +72,10 @@ _GUARD_WALK = 0.05  # m/sqrt(s): the rest of a jump that takes more than two sam
 _LARGEST_JUMP = 0.02  # [m]
 _UNDERSTOOD = 4.0  # times the force above which the stiffness is learnt
 _DEPTH_UNKNOWN = 6e-3  # [m] sigma along the shaft
+HARMONICS = 6
+"""Of the wave along the shaft, once it is found."""
+LED_FOR = 12.0
+"""s for which the depth that a record told is kept: as long as the record."""
 
 read_shaft, read_wrench = reader(ShaftMotion), reader(Wrench)
 write_fulcrum = writer(Fulcrum)
@@ -72,8 +90,11 @@ def constants(params: FulcrumParams) -> Floats:
     """
     check(params, "fulcrum_estimator")
     n = 5 + 6 * params.harmonics
-    lengths = (n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS), params.harmonics)
-    names = ("P", "record", "sums", "scalars", "rms", "end")
+    finer = 6 * (HARMONICS - params.harmonics)
+    steady = steadying.SIZE if params.steady else 0
+    lengths = [n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS)]
+    lengths += [params.harmonics, finer, steady]
+    names = ("P", "record", "sums", "scalars", "rms", "finer", "steady_at", "end")
     places = dict(zip(names, np.cumsum(lengths).tolist(), strict=True))
     every = max(1, round(RECORD_PERIOD / params.period))
     return packed(params, n=n, every=float(every), **places)
@@ -89,6 +110,9 @@ class Memory(NamedTuple):
         sums: For its next entry, shape (13,).
         scalars: See `SCALARS`.
         rms: Of each harmonic, in m.
+        finer: a, b (3 each) of the bank's harmonics above the filter's, when it
+            last spoke.
+        steady: Of `steady`, if the estimate is kept so.
     """
 
     x: Floats
@@ -97,6 +121,8 @@ class Memory(NamedTuple):
     sums: Floats
     scalars: Floats
     rms: Floats
+    finer: Floats
+    steady: Floats
 
 
 @compiled
@@ -110,7 +136,9 @@ def memory(packed: Floats, z: Floats) -> Memory:
         z[c.record : c.sums].reshape((RECORD, WIDTH)),
         z[c.sums : c.scalars],
         z[c.scalars : c.rms],
-        z[c.rms :],
+        z[c.rms : c.finer],
+        z[c.finer : c.steady_at],
+        z[c.steady_at :],
     )
 
 
@@ -196,6 +224,14 @@ def report(packed: Floats, z: Floats, time: float, shaft_now: Floats) -> Floats:
         a, b = xyz(x, 3 + 6 * k), xyz(x, 6 + 6 * k)
         p = plus(p, along(scaled(co, a), -si, b))
         v = along(v, -w, along(scaled(si, a), co, b))
+    if scalars[LED] > 0.0:
+        since = LED_FOR - scalars[LED] + ahead
+        for k in range(len(m.finer) // 6):
+            w = (len(m.rms) + k + 1) * omega
+            co, si = cos(w * since), sin(w * since)
+            a, b = xyz(m.finer, 6 * k), xyz(m.finer, 6 * k + 3)
+            p = along(p, dot(shaft.u, along(scaled(co, a), -si, b)), shaft.u)
+            v = along(v, -w * dot(shaft.u, along(scaled(si, a), co, b)), shaft.u)
     sigma_across, sigma_along = spread(P, shaft.u, 0.5 * c.force_bias / K)
     seen = scalars[PHASE] == BREATHING and m.rms[0] >= LEAST_BREATHING
     fulcrum = Fulcrum(
@@ -229,10 +265,11 @@ def advance(
     c = packed[0]
     n = c.n
     z = old.copy()
-    x, P, record, sums, aux, rms = memory(packed, z)
+    x, P, record, sums, aux, rms, _, steady = memory(packed, z)
     shaft, wrench = read_shaft(shaft_now), read_wrench(wrench_now)
     parts = c.amplitude_walk * np.maximum(rms, LEAST_RMS)
     aux[TIME], aux[DUE] = time, 0.0
+    aux[LED] = max(aux[LED] - c.period, 0.0)
     known = aux[PHASE] == BREATHING
     walk = aux[WALK] * min(max(aux[NIS], 1.0), 10.0) if known else c.wall_walk
     if not (wrench.valid > 0.5 and finite_wrench(wrench) and finite_shaft(shaft)):
@@ -253,12 +290,25 @@ def advance(
         aux[GUARD] -= c.period
         walk = _GUARD_WALK
     predict(x, P, c.period, walk, parts, known)
+    if aux[LED] > 0.0:  # the walk is for what the filter's harmonics miss
+        spared = max(walk**2 - c.still_walk**2, 0.0) * c.period
+        for i in range(3):
+            for j in range(3):
+                P[i, j] -= spared * a.u[i] * a.u[j]
     turning = a.turning
     if not known:
         # A wall that breathes unseen under a turning shaft looks like a depth error:
         # angles are heard only while the depth is hardly known at all.
         sigma = spread(P, a.u, 0.0)[1]
         turning *= min(max(sigma / _DEPTH_UNKNOWN - 1.0, 0.0), 1.0)
+    if c.steady and known:
+        tip, v_tip = along(a.p, c.length, a.u), along(a.v, c.length, a.du)
+        rest = unexplained(steady, tip, v_tip, exp(x[LN_OMEGA]), c.period)
+        speed = norm(across(rest, a.u))
+        turning = min(max(speed / c.depth_speed - 1.0, 0.0), 1.0)
+        depth = dot(a.u, sub(xyz(x, 0), a.p))
+        f = unbiased(steady, a, depth, c.period)
+        a = Sample(a.p, a.u, a.v, a.du, f, a.m, a.damping, a.averaged, turning)
     seen = innovate(c, x, P, a)
     if seen.nis < 0.0:
         raise ValueError("fulcrum estimator: a covariance is not positive definite")
@@ -270,6 +320,7 @@ def advance(
         follow_jump(c, x, P, a, min(_LARGEST_JUMP, size))
         aux[UNLIKELY], aux[GUARD], aux[RECORDED] = 0.0, _GUARD_TIME, 0.0
         aux[JUMPS] += 1.0
+        aux[LED] = 0.0
     else:
         aux[UNLIKELY] = 0.0
         aux[NIS] += 0.02 * (min(seen.nis, 60.0) / 4.0 - aux[NIS])
@@ -277,7 +328,14 @@ def advance(
         # its motion, and says less of its stiffness.
         least = c.learn_above * (_UNDERSTOOD if known else 1.0)
         held = 3 if guard else (n if force > least else n - 1)
-        update(x, P, seen, a.u, max(seen.seen, turning), held)
+        # One sample at a time the filter tells a wave from a depth worse than the
+        # bank does from the whole record.
+        led = aux[LED] > 0.0
+        told = max(seen.seen, turning)
+        update(x, P, seen, a.u, 0.0 if led else told, held)
+        if c.steady and known:
+            told = 1.0 if led else told
+            leak(steady, x, P, a.u, xyz(c.guess, 0), told, c.period)
     sums += write_entry(entry_of(x, a, turning, seen.w))
     aux[SUMMED] += 1.0
     if aux[SUMMED] >= c.every:
@@ -290,10 +348,12 @@ def advance(
     for k in range(3, n - 2, 6):
         fulcrum = plus(fulcrum, xyz(x, k))
     away = sub(fulcrum, c.guess)
+    if c.steady and known:
+        away = across(away, a.u)
     if dot(away, away) > c.neighbourhood**2:  # refused: starts anew
         aux[REFUSED] += 1.0
         aux[PHASE] = FOLLOWING
-        aux[GUARD] = aux[RECORDED] = aux[AGREED] = 0.0
+        aux[GUARD] = aux[RECORDED] = aux[AGREED] = aux[LED] = 0.0
         x[:LN_OMEGA] = 0.0
         x[0:3] = c.guess
         own = P[LN_K, LN_K]

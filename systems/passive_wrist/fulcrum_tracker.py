@@ -1,6 +1,6 @@
 """The recursive estimate of a breathing fulcrum from wrench and shaft pose.
 
-Three decisions keep it consistent where a plain extended Kalman filter is not:
+Four decisions keep it consistent where a plain extended Kalman filter is not:
 
 - Breathing is switched on only once `breathing_rate` has found its rate in a
   record of the last twelve seconds, and that record is then *filtered again* from
@@ -9,6 +9,8 @@ Three decisions keep it consistent where a plain extended Kalman filter is not:
   mean walks fast enough to follow a breathing wall, so that the depth stays
   honestly unknown (an untold lateral wall speed v under a shaft turning at rate w
   looks like a depth error v / w). A record without motion means a still wall.
+- While the shaft has turned within the record, the depth is that of `wave_bank`,
+  which weighs every rate at once, and the filter does not touch it.
 - The stiffness is learnt only while it can be seen, above a force: at zero force
   K multiplies an offset that is mostly noise and would drift to its half. Below,
   it is *considered* (Schmidt): it widens the covariance and is not touched.
@@ -17,13 +19,18 @@ Three decisions keep it consistent where a plain extended Kalman filter is not:
 """
 
 from math import exp, log, pi, sqrt
+from typing import Any
 
 import numpy as np
 
 from systems.common.compiled import rehearse
-from systems.common.signal import example, flat, view
+from systems.common.signal import example, flat, vector, view
 from systems.common.signals import ShaftMotion, Wrench
-from systems.passive_wrist.breathing_rate import BreathingFit, find_breathing
+from systems.passive_wrist.breathing_rate import (
+    BreathingFit,
+    find_breathing,
+    fit_breathing,
+)
 from systems.passive_wrist.fulcrum_filter import FulcrumParams, prior
 from systems.passive_wrist.fulcrum_kernels import (
     LN_K,
@@ -34,6 +41,7 @@ from systems.passive_wrist.fulcrum_kernels import (
     predict,
     read_entry,
     sample_of,
+    spread,
 )
 from systems.passive_wrist.fulcrum_step import (
     AGREED,
@@ -41,6 +49,8 @@ from systems.passive_wrist.fulcrum_step import (
     FOUND,
     LEAST_BREATHING,
     LEAST_RMS,
+    LED,
+    LED_FOR,
     NIS,
     PHASE,
     RECORD,
@@ -49,6 +59,7 @@ from systems.passive_wrist.fulcrum_step import (
     STEPS,
     TIME,
     WALK,
+    WAVE,
     Memory,
     advance,
     constants,
@@ -57,11 +68,21 @@ from systems.passive_wrist.fulcrum_step import (
     to_first_force,
     uncertainty,
 )
+from systems.passive_wrist.wave_bank import WaveFit, fit_waves
 
 _CHECK = 3  # entries between two looks for the breathing
+_CHECK_NEAR = 2  # the same near a rate that is known
+_SELDOM = 12  # the same at every rate once the wall is understood
 _SHORTEST = 28  # entries before the first look
 _STILL = 50  # entries without motion that make a still wall
 _EXPECTED = 1.5  # smoothed innovations up to which the wall is understood
+_TURNED = 0.03  # rad, rms: below it a record's shafts tell no depth
+_SURE = 1.5e-3  # [m] sigma along the shaft of a depth that is taken
+_CERTAIN = 0.85  # of the evidence in the rate that is taken
+_SAME_RATE = 0.04  # in ln rate
+_BREATHS = 1.25  # that a record must hold
+_LEAST_RATE_SIGMA = 5e-3  # in ln rate
+_LEAST_LATERAL = 5e-4  # [m] rms of the first harmonic across the shaft
 
 
 class FulcrumTracker:
@@ -141,8 +162,12 @@ class FulcrumTracker:
         """Looks for the breathing, or for a still wall, in the record."""
         p, m = self.p, self.memory(z)
         x, scalars = m.x, m.scalars
-        third = scalars[STEPS] // self._every % _CHECK == 0
-        if scalars[RECORDED] < _SHORTEST or not third:
+        if scalars[RECORDED] < _SHORTEST:
+            return
+        entries = scalars[STEPS] // self._every
+        if scalars[LED] > 0.0 and entries % _CHECK_NEAR == 0:
+            self._look_near(m)
+        if entries % _CHECK:
             return
         record = m.record[RECORD - int(scalars[RECORDED]) :]
         stiffness = exp(x[LN_K])
@@ -156,6 +181,18 @@ class FulcrumTracker:
         axis /= sqrt(axis.dot(axis))
         lateral = place - place.dot(axis)[:, None] * axis
         noise = p.force_noise / sqrt(self._every) / stiffness
+        wave = self._waves(m, seen, axis)
+        if wave is not None:
+            same = fit_breathing(lateral, RECORD_PERIOD, p.harmonics, wave.rate)
+            other = abs(log(2.0 * pi * wave.rate) - x[LN_OMEGA]) > _SAME_RATE
+            u = seen.u[-1]
+            if not known or other:
+                self._filter_again(z, record, same, noise)
+                scalars[LED] = 0.0
+            self._lead(m, wave, u)
+            return
+        if scalars[LED] > 0.0 and scalars[NIS] < _EXPECTED:
+            return
         fit = find_breathing(lateral, RECORD_PERIOD, p.harmonics)
         if fit is None or not believable(fit, len(record), noise):
             scalars[AGREED] = 0.0
@@ -171,13 +208,66 @@ class FulcrumTracker:
         # Another rate than the one that is followed: the first may have been found
         # in less than a breath. It is taken when the record has long said so, or at
         # once when the wall is not understood.
-        strange = abs(log(2.0 * pi * fit.rate) - x[LN_OMEGA]) > 0.04
+        strange = abs(log(2.0 * pi * fit.rate) - x[LN_OMEGA]) > _SAME_RATE
         other = strange or not self.breathing(z)
         breaths = fit.rate * len(record) * RECORD_PERIOD
         long_said = scalars[AGREED] >= 4.0 and breaths > 1.3
         certain = long_said or scalars[NIS] > _EXPECTED
         if scalars[AGREED] >= 2.0 and (not known or (other and certain)):
             self._filter_again(z, record, fit, noise)
+
+    def _look_near(self, m: Memory) -> None:
+        """Goes on with a wave that is known: a sharp one is not foreseen for long."""
+        seen = view(Entry, m.record[RECORD - int(m.scalars[RECORDED]) :])
+        stiffness, doubt = exp(m.x[LN_K]), sqrt(m.P[LN_K, LN_K])
+        wave = fit_waves(self.p, seen, stiffness, doubt, m.scalars[WAVE])
+        if wave is not None:
+            m.scalars[WAVE] = wave.rate
+            self._lead(m, wave, seen.u[-1])
+
+    def _waves(self, m: Memory, seen: Any, axis: np.ndarray) -> WaveFit | None:
+        """The bank's fit of the record, if it knows rate and depth."""
+        turned = float(np.sqrt(np.mean(1.0 - (seen.u @ axis) ** 2)))
+        # Every rate at once is work: seldom where the wall is understood.
+        rare = m.scalars[PHASE] == BREATHING and m.scalars[NIS] < _EXPECTED
+        due = m.scalars[STEPS] // self._every % (_SELDOM if rare else _CHECK) == 0
+        if turned < _TURNED or not due:
+            return None
+        doubt = sqrt(m.P[LN_K, LN_K])
+        wave = fit_waves(self.p, seen, exp(m.x[LN_K]), doubt)
+        if wave is None:
+            return None
+        before, m.scalars[WAVE] = m.scalars[WAVE], wave.rate
+        if wave.share < _CERTAIN:
+            return None
+        agrees = abs(wave.rate - before) < _SAME_RATE * wave.rate
+        breaths = wave.rate * len(seen.u) * RECORD_PERIOD
+        # Along the shaft alone one rise of the wall is a wave as well.
+        moves = wave.lateral(axis) > _LEAST_LATERAL
+        sure = moves and breaths > _BREATHS and wave.along(seen.u[-1]) < _SURE
+        return wave if agrees and sure else None
+
+    def _lead(self, m: Memory, wave: WaveFit, u: np.ndarray) -> None:
+        """Takes the depth from the bank, the filter's place across the shaft stays.
+
+        What the bank knew before is kept where the record tells less by now.
+        """
+        before = spread(m.P, vector(u), 0.0)[1]
+        if m.scalars[LED] > 0.0 and wave.along(u) > before:
+            return
+        U = np.outer(u, u)
+        n = 3 + 6 * self.p.harmonics
+        blocks = np.kron(np.eye(n // 3), U)  # of the mean and each harmonic's parts
+        m.x[:n] += blocks @ (wave.x[:n] - m.x[:n])
+        keep = np.eye(len(m.x))
+        keep[:n, :n] -= blocks
+        m.P[:] = keep @ m.P @ keep
+        m.P[:n, :n] += blocks @ wave.P[:n, :n] @ blocks
+        m.x[LN_OMEGA] = log(2.0 * pi * wave.rate)
+        m.P[LN_OMEGA, :] = m.P[:, LN_OMEGA] = 0.0
+        m.P[LN_OMEGA, LN_OMEGA] = max(wave.rate_sigma, _LEAST_RATE_SIGMA) ** 2
+        m.finer[:] = wave.x[n:-1]
+        m.scalars[LED] = LED_FOR
 
     def _where(self, x: np.ndarray, entries: int) -> np.ndarray:
         """The fulcrum at the record's last entries, shape (entries, 3)."""

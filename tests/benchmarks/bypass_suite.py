@@ -66,7 +66,11 @@ class RetractTurnInsert:
         return scaled(min(SPEED, BYPASS.approach_rate * length), direction)
 
 
-ALL = {name: make for name, make in PLANNERS.items() if name != "field only"} | {
+ALL = {
+    name: make
+    for name, make in PLANNERS.items()
+    if name != "field only" and not name.startswith("literal")
+} | {
     "straight + constraint": lambda: Constrained(Straight()),
     "retract, turn, insert": lambda: Constrained(RetractTurnInsert()),
 }

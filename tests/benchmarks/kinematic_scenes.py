@@ -1,6 +1,7 @@
 """The local planner in random scenes: reached, contact, stuck.
 
-The corrected and the printed form of the paper's method, standing and moving obstacle.
+The corrected and the printed form of the paper's method, standing and moving obstacle,
+and the corrected one with Table I read to the letter on v_R (Figure 4) and on v_1.
 The figures are what they are: the method has local minima.
 """
 
@@ -13,7 +14,10 @@ from diagrams.gauze.kinematic_loop import Outcome, Planner, run
 from diagrams.gauze.kinematic_planners import PLANNERS
 from diagrams.gauze.scenes import scene
 
-CHOSEN = ("corrected field", "printed field", "field only")
+CHOSEN = (
+    *("corrected field", "literal on v_R", "literal on v_1", "printed field"),
+    "field only",
+)
 
 
 @dataclass

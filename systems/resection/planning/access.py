@@ -89,7 +89,7 @@ def propose_access(
             tried: list[tuple[float, Access]] = []
             for access in some:
                 try:
-                    fraction = _fraction(
+                    fraction = reachable_share(
                         tissue, access, params, margin, seed, effort, spacing
                     )
                     tried.append((fraction, access))
@@ -112,14 +112,14 @@ def propose_access(
     return Proposal(best[0][1], best[0][0], rows[np.argsort(-rows[:, 3])])
 
 
-def _fraction(
+def reachable_share(
     tissue: Tissue,
     access: Access,
     params: SnakeParams,
     margin: float,
     seed: int,
     effort: float,
-    spacing: float,
+    spacing: float = 1.0e-3,
 ) -> float:
     """Share of the whole tumour that can be reached, the cap counted as lost."""
     volume = make_volume(tissue, access, params.body_radius, spacing, margin)

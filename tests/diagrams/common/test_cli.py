@@ -147,14 +147,14 @@ def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     from diagrams.studies import load_scenario
     from systems.motion.joint_commands import JointCommands
 
-    follow = JointCommands._update
+    follow = JointCommands._calc_next
 
     def broken(self, context):
         if context.get_time() > 0.3:
             raise RuntimeError("the arm fell off")
         return follow(self, context)
 
-    monkeypatch.setattr(JointCommands, "_update", broken)
+    monkeypatch.setattr(JointCommands, "_calc_next", broken)
     scenario = load_scenario("gauze_static", duration=1.0)
     run = run_scenario(scenario, tmp_path, with_replay=False)
     assert "the arm fell off" in run.error
@@ -171,3 +171,67 @@ def test_an_interruption_before_the_run_is_no_traceback(monkeypatch, capsys):
     monkeypatch.setitem(COMMANDS, "run", interrupted)
     assert main(["run", "gauze_static"]) == 130
     assert "interrupted before the run began" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def two_runs(tmp_path_factory):
+    """A folder with the results of two short runs."""
+    folder = tmp_path_factory.mktemp("runs")
+    run("run", "gauze_sta*", "nav_one_static", "--out", str(folder), *SHORT)
+    run("run", "gauze_static", "--seed", "5", "--out", str(folder / "5"), *SHORT)
+    return folder
+
+
+def test_several_scenarios_and_patterns_each_get_a_folder(two_runs):
+    for name in ("gauze_static", "nav_one_static"):
+        made_by = json.loads((two_runs / name / "provenance.json").read_text())
+        assert made_by["drake"]
+        assert made_by["commit"]
+        page = (two_runs / name / "report.html").read_text()
+        assert "data:image/png;base64" in page
+        assert f"<h1>{name}</h1>" in page
+
+
+def test_pattern_without_a_match_is_refused(capsys):
+    assert run("run", "gaze_*") == 2
+    assert "no scenario matches 'gaze_*'" in capsys.readouterr().err
+
+
+def test_figures_for_people_and_for_programs(tmp_path, capsys):
+    assert run("run", "nav_one_static", "--out", str(tmp_path), *SHORT, "--json") == 0
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["system"] == "navigation"
+    assert isinstance(figures["min_clearance"], float)
+
+
+def test_compare_marks_what_differs(two_runs, tmp_path, capsys):
+    one, other = two_runs / "gauze_static", two_runs / "5"
+    picture = tmp_path / "compare.png"
+    assert run("compare", str(one), str(other), "--out", str(picture)) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert next(x for x in lines if x.split()[:1] == ["seed"]).endswith("*")
+    assert not next(x for x in lines if x.split()[:1] == ["contact"]).endswith("*")
+    assert picture.stat().st_size > 10_000
+
+
+def test_compare_and_replay_need_results(tmp_path, capsys):
+    assert run("compare", str(tmp_path), str(tmp_path)) == 2
+    assert "holds no results" in capsys.readouterr().err
+    assert run("replay", str(tmp_path)) == 2
+    assert "no such file" in capsys.readouterr().err
+
+
+def test_replay_opens_the_browser(tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    (tmp_path / "replay.html").write_text("<html></html>")
+    assert run("replay", str(tmp_path)) == 0
+    assert opened == [(tmp_path / "replay.html").as_uri()]
+
+
+def test_completion_and_version(capsys):
+    assert run("completion", "bash") == 0
+    assert "campaign" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(["--version"])
+    assert capsys.readouterr().out.startswith("trocar 0.")

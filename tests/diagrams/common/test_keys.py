@@ -12,6 +12,7 @@ from diagrams.studies import STUDIES, load_scenario
 from systems.common.parameter import keys
 
 NAMES = {
+    "keyhole": "keyhole_circle",
     "gauze": "gauze_breathing",
     "wrist": "pwe_arc",
     "navigation": "nav_three_moving",

@@ -181,6 +181,23 @@ def test_the_gated_table_tells_parting_from_closing():
     assert decision(PARAMS, back, *parting) == (1.0, 0.0, 0.0)
 
 
+def test_figure_4_reads_the_current_velocity_and_the_default_the_wanted_one():
+    """A robot that gives way to O still wants to go through it."""
+    guide, obstacle = meeting((0.0, -0.03, 0.0))
+    zero = (0.0, 0.0, 0.0)
+    behaviours = ((0.0, 0.03, 0.0), zero, (0.0, -0.03, 0.0))
+    giving_way = (0.0, -0.03, 0.0)
+    c3 = {}
+    for velocity in ("v_1", "v_R"):
+        params = FuzzyArbiterParams(table="literal", velocity=velocity)
+        weights, _, _ = arbitrate(
+            params, giving_way, DT, behaviours, guide, ROBOT, obstacle, TARGET
+        )
+        c3[velocity] = weights.c3
+    assert c3["v_1"] > 0.5
+    assert c3["v_R"] == 0.0  # A, "go away": the field alone, and back it turns
+
+
 @pytest.mark.parametrize("speed", [0.0, 0.004])
 def test_a_standing_or_trembling_obstacle_is_left_to_the_field(speed):
     guide, obstacle = meeting((0.0, -speed, 0.0))
@@ -286,6 +303,7 @@ def test_block_output_is_the_step_that_its_update_makes():
     "change, message",
     [
         ({"table": "printed"}, "table='printed': expected one of literal, gated"),
+        ({"velocity": "v_O"}, "velocity='v_O': expected one of v_1, v_R"),
         (
             {"distances": [0.01, 0.02]},
             r"distances=\[0.01, 0.02\] m: expected 3 numbers",

@@ -203,6 +203,33 @@ def test_block():
     assert expected[0] < 0.0
 
 
+@pytest.fixture(scope="module")
+def block():
+    dut = VelocityCorrections()
+    return dut, dut.CreateDefaultContext()
+
+
+@pytest.mark.parametrize("i", range(5))
+@pytest.mark.parametrize("j", range(5))
+def test_the_block_keeps_each_cells_share_in_full(block, i, j):
+    """O's shaft swings through the way, 0 to 80 mm ahead and in 0 to 2 s."""
+    dut, context = block
+    distance, time = PARAMS.distances[j], PARAMS.times[i]
+    # The way is near the plane of the swing from `near_distance` before it on.
+    x, speed = distance + PARAMS.near_distance, 0.02
+    tip, v_O = (x, -speed * max(time, 1e-6), -0.12), (0.0, speed, 0.0)
+    values = {
+        "v1": (0.05, 0.0, 0.0),
+        "guide": flat(guide((0.0, 0.0, -0.1), (0.15, 0.0, -0.1))),
+        "obstacles": flat(obstacle(tip, v_O, g=(x, 0.0, 0.0))),
+    }
+    for name, value in values.items():
+        dut.GetInputPort(name).FixValue(context, value)
+    kept = 1.0 + dut.GetOutputPort("v2").Eval(context)[0] / 0.05
+    scales = dict(zip(SPEEDS, PARAMS.scales, strict=True))
+    assert kept == pytest.approx(scales[ROWS[i][1 + j]], abs=1e-3)
+
+
 @pytest.mark.parametrize(
     "change, message",
     [
@@ -215,6 +242,7 @@ def test_block():
         ({"distances": [0.0, nan, 0.1, 0.2, 0.3]}, "distances=.*5 numbers"),
         ({"scales": [0.1, 0.2, 0.3, 0.4, 0.5, 1.0]}, "scales=.*0 at the start and 1"),
         ({"horizon": 0.0}, "horizon=0.0 s: expected > 0"),
+        ({"horizon": 2.5}, "horizon=2.5 s: expected >= 1.5 times the last of times"),
         ({"near_distance": 5.0}, "near_distance=5.0 m: expected > 0 and <= 0.1"),
         ({"moving_speed": -1.0}, "moving_speed=-1.0"),
     ],
