@@ -149,13 +149,14 @@ def withdrawn(tool: HandTool) -> HandTool:
 
 def check(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    _check_tools(scenario)
+    check_tools(scenario)
     check_wrist(scenario)
-    _check_fulcrums(scenario)
+    check_fulcrums(scenario)
     _check_reach(scenario)
 
 
-def _check_tools(scenario: GauzeScenario) -> None:
+def check_tools(scenario: GauzeScenario) -> None:
+    """Raises ScenarioError for tools that cannot be."""
     names = [tool.name for tool in scenario.tools]
     for name in names:
         if names.count(name) > 1 or not name.isidentifier():
@@ -181,7 +182,8 @@ def _check_tools(scenario: GauzeScenario) -> None:
                 )
 
 
-def _check_fulcrums(scenario: GauzeScenario) -> None:
+def check_fulcrums(scenario: GauzeScenario) -> None:
+    """Raises ScenarioError for trocars that are too close to each other."""
     fulcrums = {"robot": scenario.robot.p_WG}
     fulcrums |= {tool.name: tool.p_WG for tool in scenario.tools}
     names = list(fulcrums)

@@ -85,7 +85,7 @@ def propose_access(
         for point in points:
             access = Access(point, direction.tolist(), wish.clearance)
             try:
-                fraction = _fraction(tissue, access, params, margin, seed, 0.25)
+                fraction = reachable_share(tissue, access, params, margin, seed, 0.25)
             except ValueError as error:
                 reason = str(error)
                 continue
@@ -95,7 +95,7 @@ def propose_access(
     tried.sort(key=lambda item: -item[0])
     best = max(
         (
-            (_fraction(tissue, access, params, margin, seed, 1.0), access)
+            (reachable_share(tissue, access, params, margin, seed, 1.0), access)
             for _, access in tried[:FINALISTS]
         ),
         key=lambda item: item[0],
@@ -104,7 +104,7 @@ def propose_access(
     return Proposal(best[1], best[0], table)
 
 
-def _fraction(
+def reachable_share(
     tissue: Tissue,
     access: Access,
     params: SnakeParams,

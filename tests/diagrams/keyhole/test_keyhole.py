@@ -10,6 +10,7 @@ from diagrams.bedside.bedside import add_bedside
 from diagrams.common.scenario import ScenarioError
 from diagrams.keyhole.operation import circle, outline
 from diagrams.keyhole.plots import plots
+from diagrams.keyhole.scenario import BASE
 from diagrams.studies import load_scenario
 from plants.instruments.tube import channel_frame
 from plants.snake.kinematics import forward
@@ -74,8 +75,8 @@ def test_a_turn_of_the_circle_is_the_circle():
 def test_a_resection_is_planned_with_the_base_out_of_the_tube():
     scenario = load_scenario("keyhole_circle", ["task=resect"])
     case = outline(scenario)
-    assert case.session.params.travel[0] == -scenario.instrument.gap
-    assert case.plan.posture(0.0)[0] >= -scenario.instrument.gap
+    assert case.session.params.travel[0] == -scenario.instrument.gap - BASE
+    assert case.plan.posture(0.0)[0] >= -scenario.instrument.gap - BASE
 
 
 def test_plots():

