@@ -52,8 +52,10 @@ FIGURES = {
     "time_over_limit": Figure("s", "with the force over the limit"),
     "rms_estimate_error": Figure("m", "of the estimated fulcrum, rms"),
     "rms_lateral_estimate_error": Figure("m", "the same, across the shaft"),
+    "rms_depth_estimate_error": Figure("m", "the same, along the shaft"),
+    "probe_peak_force": Figure("N", "greatest before the figures start"),
     "fulcrum_convergence_time": Figure(
-        "s", "until the estimate is within 1 mm to stay"
+        "s", "from the start until the estimate is within 1 mm to stay"
     ),
     "lateral_convergence_time": Figure("s", "the same, across the shaft"),
     "depth_convergence_time": Figure("s", "the same, along the shaft"),
@@ -99,6 +101,7 @@ FIGURES = {
     "tumour_volume": Figure("m3", "as operated on"),
     "mask_volume": Figure("m3", "of the mask itself"),
     "cap_volume": Figure("m3", "of the tumour that the channel takes"),
+    "channel_volume": Figure("m3", "of brain that the channels bore, on the grid"),
     "reachable_fraction": Figure("%", "of the tumour that can be reached"),
     "planned_fraction": Figure("%", "of the tumour that the plan takes"),
     "resected_fraction": Figure("%", "of the tumour that was taken"),
@@ -107,7 +110,11 @@ FIGURES = {
     "min_critical_distance": Figure("m", "least of the robot to what is critical"),
     "body_collisions": Figure("", "of the robot's body with tissue"),
     "procedures": Figure("", "that were planned"),
-    "finishes": Figure("", "single steps that finish"),
+    "strokes": Figure("", "continuous passes of the tool that finish"),
+    "single_step_share": Figure("%", "of the resected volume, by single steps"),
+    "entries": Figure("", "channels that were used"),
+    "bored_healthy": Figure("m3", "healthy tissue that further channels bored"),
+    "critical_touched": Figure("", "whether anything critical was touched"),
     "planning_time": Figure("s", "wall time of the plan"),
     "reach_time": Figure("s", "wall time of the reachable part"),
     "access_time": Figure("s", "wall time of the proposed access"),

@@ -76,7 +76,7 @@ def measure(run: Any) -> dict[str, Any]:
             in_cone(tip, logged(run, run.scenario.camera).view_cone).mean()
         ),
         "max_speed": float(speed.max()),
-        "joint_limit_time": float(np.mean(run.joints.status.code) * time[-1]),
+        "joint_limit_time": float(np.mean(run.joints.status.code == 1) * time[-1]),
         "stops": stops(time, run.navigation.stop.code),
     }
     figures |= bypass_figures(run, arrival, tip_error)

@@ -30,9 +30,10 @@ def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> 
     bedside.systems["posed_tools"] = posed
     bedside.systems["clearance"] = add_clearance(
         builder,
+        plant,
         scene_graph,
         bedside.instrument.shaft_geometry,
-        posed.shafts,
+        posed,
         in_the_way(scenario.tools),
     )
     return bedside

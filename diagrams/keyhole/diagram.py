@@ -46,6 +46,8 @@ KEYHOLE_WIRES = (
     *WRIST_WIRES,
     ("plant.pa10_state", "robot_location.arm_state"),
     ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("plant.pa10_state", "joint_commands.arm_state"),
+    ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("joint_commands.set_point", "plant.pa10_desired_state"),
     # The snake's weight shifts along the tube.
     ("snake_location.posture", "snake_load.posture"),
@@ -60,7 +62,7 @@ KEYHOLE_WIRES = (
     ("organ_estimator.motion", "phases.organ"),
     ("fulcrum_estimator.estimate", "phases.fulcrum"),
     ("tool_wrench.shaft", "phases.shaft"),
-    ("tool_wrench.wrench", "phases.wrench"),
+    ("wrench_watch.believed", "phases.wrench"),
     ("passive_wrist.permission", "phases.permission"),
     ("wire_watch.alarm", "phases.alarm"),
     # The tube follows the organ, through the passive wrist.
@@ -254,4 +256,4 @@ def make_keyhole_diagram(
     if s.others:
         more, shown = theatre_wires(s, systems)
         wires, exports = (*wires, *more), shown | exports
-    return finish(builder, "keyhole", systems, wires, exports)
+    return finish(builder, "keyhole", systems, wires, exports, s.faults)

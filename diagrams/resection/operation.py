@@ -94,6 +94,37 @@ def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
     return session, tissue.name
 
 
+def resumed(file: Path, fresh: Session) -> Session:
+    """The session of a file, which must be one of the same operation.
+
+    Args:
+        file: It is there.
+        fresh: The operation at its beginning.
+
+    Raises:
+        ScenarioError: If it is another's; what differs is named.
+        ValueError: If the file is damaged.
+    """
+    session = load_session(file)
+    old, new = session.volume, fresh.volume
+    same = old.labels.shape == new.labels.shape and (old.labels == new.labels).all()
+    pairs = {"tumour or access": (bool(same), True), "margin": (old.margin, new.margin)}
+    pairs |= {
+        name: (getattr(session, name), getattr(fresh, name))
+        for name in ("clearance", "accuracy")
+    }
+    told = vars(session.params)
+    pairs |= {f"snake.{k}": (told[k], v) for k, v in vars(fresh.params).items()}
+    differs = [
+        f"{k} ({was} there, {is_now} here)"
+        for k, (was, is_now) in pairs.items()
+        if was != is_now
+    ]
+    if differs:
+        raise ScenarioError(f"session {str(file)!r} differs in {', '.join(differs)}")
+    return session
+
+
 def outline(scenario: ResectionScenario) -> Operation:
     """An operation of which nothing is planned, on a tumour that is quickly made."""
     access = Access(direction=[0.0, 0.0, -1.0])
@@ -114,11 +145,7 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
     file = Path(scenario.session) if scenario.session else None
     session, tumour = new_session(scenario)
     if file is not None and file.is_file():
-        fresh, session = session, load_session(file)
-        if session.volume.labels.shape != fresh.volume.labels.shape or (
-            (session.volume.labels != fresh.volume.labels).any()
-        ):
-            raise ScenarioError(f"session {str(file)!r} is of another tumour or access")
+        session = resumed(file, session)
     session.file = file
     reach = reach_of(session, scenario, progress)
     start = perf_counter()
@@ -144,7 +171,9 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
     planning_time = perf_counter() - start
     done = Execution()
     if file is not None:
-        done = load_execution(beside(file, "executed"), session.postures)
+        done = load_execution(
+            beside(file, "executed"), session.postures, session.volume.labels.shape
+        )
     return Operation(
         scenario,
         session=session,

@@ -141,4 +141,4 @@ def make_snake_diagram(
     wires = WIRES + (ELASTIC_WIRES if elastic else DRUM_WIRES)
     tension = "elastic_wires.tension" if elastic else "wire_tension.tension"
     exports = EXPORTS | {"wires.tension": tension}
-    return finish(builder, "snake", systems, wires, exports)
+    return finish(builder, "snake", systems, wires, exports, scenario.faults)

@@ -92,8 +92,8 @@ def constants(params: FulcrumParams) -> Floats:
     n = 5 + 6 * params.harmonics
     finer = 6 * (HARMONICS - params.harmonics)
     steady = steadying.SIZE if params.steady else 0
-    lengths = (n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS))
-    lengths = (*lengths, params.harmonics, finer, steady)
+    lengths = [n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS)]
+    lengths += [params.harmonics, finer, steady]
     names = ("P", "record", "sums", "scalars", "rms", "finer", "steady_at", "end")
     places = dict(zip(names, np.cumsum(lengths).tolist(), strict=True))
     every = max(1, round(RECORD_PERIOD / params.period))

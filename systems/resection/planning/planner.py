@@ -109,7 +109,7 @@ class PlannerParams:
         1_000_000,
         "strokes that a plan begins at most",
         least=1,
-        most=10_000_000_000,
+        most=100_000_000,
     )
     seed: int = parameter(1, "of all random choices", least=0, most=2**63 - 1)
 
@@ -191,7 +191,8 @@ class Planner:
                 best, least = plan, price
         best.go_home()
         self.session.adopt(best)
-        self.session.concluded = repr(self.params)
+        if self.tried < self.params.budget:  # else there may be more to do
+            self.session.concluded = repr(self.params)
         self.session.save_if_filed()
 
     def price(self, plan: Session) -> float:

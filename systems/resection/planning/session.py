@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
 from plants.tissue.volume import Channel, Volume
-from systems.common.archive import read_archive, write_archive
+from systems.common.archive import read_archive, sensible, write_archive
 from systems.common.parameter import check
 from systems.resection.planning.feasibility import (
     NEVER,
@@ -30,6 +31,7 @@ from systems.resection.planning.procedure import (
     widest_bend,
     with_tool,
 )
+from systems.resection.planning.saved import check_removed, check_saved
 from systems.resection.planning.sweep import LIMIT, posture_at, sweep_procedure
 from systems.resection.planning.tree import (
     Tree,
@@ -215,9 +217,9 @@ class Session:
             body = body_of(params, self.clearance, self.accuracy)
         own, start = self._in_entry(procedure, params)
         clearance = self.volume.channel - params.body_radius
-        refusal = check_jam(procedure, clearance, params) or check_reach(
-            own, start, params
-        )
+        refusal = check_jam(
+            procedure, clearance, params, self.clearance, self.accuracy
+        ) or check_reach(own, start, params)
         if refusal:
             if refusal.where is not None:
                 refusal.where = (self.X_WE @ [*refusal.where, 1.0])[:3].tolist()
@@ -438,14 +440,19 @@ def load_session(path: Path) -> Session:
     """Resumes a session from its file.
 
     Raises:
-        ValueError: If the file is not there or damaged; the one before is offered.
+        ValueError: If the file is not there or damaged, and the one before is offered;
+            or if what it says makes no sense.
     """
-    meta, arrays = read_archive(path, "session")
-    if meta["format"] != FORMAT:
-        raise ValueError(
-            f"session {str(path)!r} has format {meta['format']}, expected {FORMAT}: "
-            "it was planned by another version; plan it anew"
-        )
+    meta, arrays = read_archive(path, "session", FORMAT)
+    with sensible(path, "session"):
+        session = _restored(meta, arrays)
+    session.file = path
+    return session
+
+
+def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
+    """The session of a file's plain data and arrays, held against each other."""
+    check_saved(meta, arrays)
     volume = Volume(
         arrays["labels"],
         arrays["origin"],
@@ -480,7 +487,7 @@ def load_session(path: Path) -> Session:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))
     session.concluded = meta["concluded"]
-    session.file = path
+    check_removed(session)
     return session
 
 
