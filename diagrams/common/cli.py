@@ -514,5 +514,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"trocar: error: {reason}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("trocar: interrupted before the run began", file=sys.stderr)
+        before = " before the run began" if arguments.command == "run" else ""
+        print(f"trocar: interrupted{before}", file=sys.stderr)
         return 130

@@ -45,6 +45,19 @@ def test_the_snake_leaves_the_tube_after_the_gate_alone():
     assert out[-1] == 1.0
 
 
+def test_approach():
+    """Round the surgeon's moving tool, unloaded, to the gate."""
+    figures = run("keyhole_approach", "duration=14").metrics
+    assert figures["min_tool_clearance"] >= 4e-3
+    assert figures["gate_opened"] < 14.0
+    assert figures["rms_lateral_force"] < 0.15
+    assert [one["phase"] for one in figures["phases"]][:3] == [
+        "probe",
+        "approach",
+        "station",
+    ]
+
+
 def test_everything_hangs_on_the_sensor():
     scenario = load_scenario("keyhole_circle", duration=1.0)
     added = []
