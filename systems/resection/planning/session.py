@@ -498,7 +498,7 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
         Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
         mask_volume=meta["mask_volume"],
         notes=meta["notes"],
-        image=meta["image"]
+        image=meta.get("image")
         and Grid(tuple(meta["image"]["sizes"]), np.array(meta["image"]["X_PI"])),
         more=[
             Channel(np.array(row["X_WE"]), row["depth"], row["time"])
