@@ -105,6 +105,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.common.cli",
         "diagrams.learning.baselines",
         "diagrams.learning.environments",
+        "diagrams.live.session",
     }
     assert importers(arrows, "diagrams.studies") == {
         "diagrams.campaigns.acts",
@@ -113,16 +114,19 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.common.cli",
         "diagrams.common.run",
         "diagrams.learning.environments",
+        "diagrams.live.session",
     }
     planning = "systems.resection.planning"
     assert importers(
         arrows, f"{planning}.planner", f"{planning}.reach", f"{planning}.access"
     ) == {
+        "diagrams.keyhole.access",
         "diagrams.resection.console",
         "diagrams.resection.operation",
         "diagrams.resection.scenario",  # the planner's parameters
     }
     assert importers(arrows, "diagrams.resection.operation") == {
+        "diagrams.keyhole.access",
         "diagrams.keyhole.operation",
         "diagrams.resection.console",
         "diagrams.resection.diagram",  # the case's type

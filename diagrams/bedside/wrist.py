@@ -22,15 +22,19 @@ from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
 from systems.passive_wrist.wrist_law import MODES, WristParams
 from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
+from systems.sensing.wrench_watch import WrenchWatch, WrenchWatchParams
 
 WRIST_WIRES = (
     ("tool_wrench.shaft", "fulcrum_estimator.shaft"),
-    ("tool_wrench.wrench", "fulcrum_estimator.wrench"),
+    ("tool_wrench.shaft", "wrench_watch.shaft"),
+    ("tool_wrench.wrench", "wrench_watch.wrench"),
+    ("wrench_watch.believed", "fulcrum_estimator.wrench"),
     ("tool_wrench.shaft", "passive_wrist.shaft"),
-    ("tool_wrench.wrench", "passive_wrist.wrench"),
+    ("wrench_watch.believed", "passive_wrist.wrench"),
     ("fulcrum_estimator.estimate", "passive_wrist.estimate"),
     ("wall_force.fulcrum", "passive_wrist.true_fulcrum"),
     ("passive_wrist.tool", "joint_commands.tool"),
+    ("passive_wrist.permission", "joint_commands.permission"),
 )
 """Sensor, estimator and emulation; the task's tool goes to `tool_wanted`."""
 
@@ -72,6 +76,7 @@ class WristSettings:
     )
     wall_motion: WallMotionParams = part(WallMotionParams)
     tool_wrench: ToolWrenchParams = part(ToolWrenchParams)
+    wrench_watch: WrenchWatchParams = part(WrenchWatchParams)
     fulcrum_estimator: FulcrumParams = part(FulcrumParams)
     passive_wrist: WristParams = part(WristParams)
 
@@ -79,7 +84,7 @@ class WristSettings:
 def check_wrist(scenario: Any) -> None:
     """Raises ScenarioError for wrist settings that do not go together."""
     period = scenario.joints.period
-    for name in ("tool_wrench", "fulcrum_estimator", "passive_wrist"):
+    for name in ("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"):
         own = getattr(scenario, name).period
         if abs(own - period) > 1e-9:
             raise ScenarioError(
@@ -125,9 +130,10 @@ def add_wrist(
             bedside.below,
             scenario.wall_motion.stiffness_factor,
         ),
+        "wrench_watch": WrenchWatch(scenario.wrench_watch, guess),
         "fulcrum_estimator": FulcrumEstimator(estimator),
         "passive_wrist": PassiveWristEmulation(wrist),
     }
-    for name in ("fulcrum_estimator", "passive_wrist"):
+    for name in ("wrench_watch", "fulcrum_estimator", "passive_wrist"):
         builder.AddNamedSystem(name, systems[name])
     return systems

@@ -21,15 +21,16 @@ def settled(time: np.ndarray, value: np.ndarray, bound: float) -> float | None:
     return float(time[last + 1] - time[0])
 
 
-def estimate_errors(run: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Estimate minus true fulcrum: 3-D, across the shaft, and normalised squared."""
+def estimate_errors(run: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Estimate minus true fulcrum: 3-D, across, along, and normalised squared."""
     error = run.wrist.fulcrum.p - run.wall.fulcrum.p
     u = run.wrist.shaft.u
     along = np.einsum("ni,ni->n", error, u)
     across = error - along[:, None] * u
     C = run.wrist.covariance.P.reshape(-1, 3, 3) + 1e-14 * np.eye(3)
     squared = np.einsum("ni,ni->n", error, np.linalg.solve(C, error[..., None])[..., 0])
-    return np.linalg.norm(error, axis=1), np.linalg.norm(across, axis=1), squared
+    size, side = np.linalg.norm(error, axis=1), np.linalg.norm(across, axis=1)
+    return size, side, np.abs(along), squared
 
 
 def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]:
@@ -37,13 +38,13 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
 
     Args:
         run: A run whose log holds `WRIST_SIGNALS`.
-        start: Figures start here [s].
+        start: Figures of force and error start here [s]; times count from zero.
         event: Time of the wall's jump [s]; negative for none.
     """
     time = run.signals["time"]
     force = np.linalg.norm(run.wall.force.f, axis=1)
     off = run.wall.fulcrum_error.distance
-    spatial, across, squared = estimate_errors(run)
+    spatial, across, along, squared = estimate_errors(run)
     late = time >= start - 1e-9
     wrist = run.scenario.passive_wrist
     scale = run.wrist.permission.speed_scale
@@ -59,8 +60,11 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
         "max_fulcrum_error": float(off[late].max(initial=0.0)),
         "rms_estimate_error": rms(spatial[late]),
         "rms_lateral_estimate_error": rms(across[late]),
-        "fulcrum_convergence_time": settled(time[late], spatial[late], CONVERGED),
-        "lateral_convergence_time": settled(time[late], across[late], CONVERGED),
+        "rms_depth_estimate_error": rms(along[late]),
+        "fulcrum_convergence_time": settled(time, spatial, CONVERGED),
+        "lateral_convergence_time": settled(time, across, CONVERGED),
+        "depth_convergence_time": settled(time, along, CONVERGED),
+        "probe_peak_force": float(force[~late].max(initial=0.0)),
         "fulcrum_error_3s": float(np.interp(start + 3.0, time, spatial)),
         "nees_above_95": float(np.mean(squared[time > 15.0] > CHI2_95))
         if time[-1] > 16.0

@@ -80,7 +80,7 @@ def estimate(run: Any, start: float) -> Figure:
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
     )
-    spatial, across, _ = estimate_errors(run)
+    spatial, across, *_ = estimate_errors(run)
     sigma_across = run.wrist.fulcrum.sigma_across * MM
     sigma_along = run.wrist.fulcrum.sigma_along * MM
     places[1].semilogy(time, spatial * MM, color=COLORS["robot"], label="3-D error")

@@ -2,22 +2,28 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import suppress
 import fnmatch
 import json
 import logging
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import ScenarioError, nearest, scenario_files
 from diagrams.common.tree import read_tree
+
+IMPORTED = ("jigsaws", "dvrk", "plus", "csv", "breathing", "crowd")
+"""Kinds of recordings that can be imported."""
 
 EXAMPLES = """\
 examples:
   trocar scenarios                          what there is to run
   trocar run gauze_dynamic                  results in out/gauze_dynamic
   trocar run 'pwe_*' nav_crowd              several, one after the other
+  trocar live gauze_dynamic                 take part, in the browser
   trocar replay out/gauze_dynamic           opens the replay in the browser
   trocar compare out/gauze_static out/printed
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
@@ -25,6 +31,9 @@ examples:
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
+  trocar export out/resect_paper.session --to viewer   what a viewer can load
+  trocar import FILE --kind jigsaws         another's recording as one of ours
+  trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
 """
 
@@ -74,6 +83,25 @@ def make_parser() -> argparse.ArgumentParser:
     compare.add_argument(
         "--out", metavar="FILE", type=Path, help="PNG; default: out/compare.png"
     )
+    live = commands.add_parser(
+        "live",
+        help="run a gauze scenario in real time and take part in the browser",
+        description="Runs a gauze scenario in real time: the surgeon's tools follow "
+        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
+        "target; space: pause). What the hands did is kept as recordings, and run "
+        "again at the end for figures and replay.",
+    )
+    live.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")
+    live.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    live.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
+    live.add_argument("--duration", type=float, metavar="S", help="default: 600 s")
+    live.add_argument("--out", metavar="DIR", type=Path, help="default: out/live")
+    live.add_argument(
+        "--host", default="localhost", help="where it listens; '*' for everyone"
+    )
     replay = commands.add_parser("replay", help="open a run's replay in the browser")
     replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
     shell = commands.add_parser(
@@ -98,6 +126,19 @@ def make_parser() -> argparse.ArgumentParser:
         "pattern", metavar="PATTERN", nargs="?", default="", help="part of the key"
     )
     keys.add_argument("--json", action="store_true", help="for programs")
+    access = commands.add_parser(
+        "access",
+        help="propose entries and trocars of a keyhole operation",
+        description="Tries entries through the scenario's trocar, and trocars on the "
+        "wall; a table, and a picture in FILE.",
+    )
+    access.add_argument("name", metavar="NAME", help="a keyhole scenario")
+    access.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/NAME.access.png"
+    )
+    access.add_argument(
+        "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
     resect = commands.add_parser(
         "resect",
         help="plan a resection by hand, line by line",
@@ -111,6 +152,20 @@ def make_parser() -> argparse.ArgumentParser:
     resect.add_argument(
         "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
     )
+    export = commands.add_parser(
+        "export",
+        help="write a resection's session for a viewer: label maps, path, channels",
+        description="Writes label maps on the mask's own grid (NRRD, NIfTI) and on "
+        "the plan's, the tool's path (VTK), the channels (OBJ), in LPS and mm, and "
+        "the plan (JSON). Needs the extra `images`.",
+    )
+    export.add_argument(
+        "source", metavar="SESSION", type=Path, help="a session's file, or a run's DIR"
+    )
+    export.add_argument(
+        "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
+    )
+    add_import(commands)
     campaign = commands.add_parser(
         "campaign",
         help="run a scenario many times, varied, and say how sure the answer is",
@@ -135,6 +190,43 @@ def make_parser() -> argparse.ArgumentParser:
         help="a planner of one's own as a further variant of `crossing`",
     )
     return parser
+
+
+def add_import(commands: Any) -> None:
+    """Adds `trocar import` to a parser's commands."""
+    parser = commands.add_parser(
+        "import",
+        help="make the project's own file of another's recording",
+        description="Reads a recording, says what it holds, and writes a CSV (of a "
+        "crowd: a scenario). Nothing of it is kept elsewhere.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument("--kind", choices=IMPORTED, required=True)
+    parser.add_argument("--out", metavar="FILE", type=Path, help="default: out/STEM.*")
+    parser.add_argument(
+        "--place",
+        metavar="X,Y,Z",
+        default="0,0,-0.11",
+        help="of the motion's mean in W [m]",
+    )
+    parser.add_argument(
+        "--yaw", type=float, default=0.0, help="turn about the vertical [deg]"
+    )
+    parser.add_argument(
+        "--arm",
+        default="",
+        help="jigsaws: master_left ... slave_right; plus: its transform, e.g. "
+        "ProbeToTracker; breathing: the column",
+    )
+    parser.add_argument(
+        "--rate", type=float, default=100.0, help="breathing: samples a second"
+    )
+    parser.add_argument(
+        "--start", type=float, default=0.0, help="crowd: first second of it"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=40.0, help="crowd: how long [s]"
+    )
 
 
 def list_scenarios(arguments: argparse.Namespace) -> int:
@@ -232,6 +324,32 @@ def compare_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def live_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar live`."""
+    import webbrowser
+
+    from diagrams.common.figures import table
+    from diagrams.common.replay import start_meshcat
+    from diagrams.common.run import run_scenario
+    from diagrams.live.session import Session
+    from diagrams.studies import load_scenario
+
+    if not 0.0 < arguments.speed <= 20.0:
+        raise ScenarioError(f"--speed {arguments.speed}: expected > 0 and <= 20")
+    scenario = load_scenario(arguments.name, arguments.overrides, arguments.seed)
+    out = arguments.out or Path("out") / "live"
+    meshcat = start_meshcat(arguments.host)
+    session = Session(scenario, meshcat)
+    print(f"{meshcat.web_url()}  (Ctrl-C ends it and keeps what was done)")
+    webbrowser.open(meshcat.web_url())
+    with suppress(KeyboardInterrupt):
+        session.play(arguments.duration or 600.0, arguments.speed)
+    run = run_scenario(session.save(out), out, progress=progress_bar)
+    print(table(run.metrics))
+    print(f"\n{out}/: trocar replay {out}, trocar run {out / 'scenario.yaml'}")
+    return 1 if run.error else 0
+
+
 def replay_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar replay`."""
     import webbrowser
@@ -287,6 +405,26 @@ def keys_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def access_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar access`."""
+    from diagrams.common.plots import save_figure
+    from diagrams.keyhole.access import draw, find_ways, table
+    from diagrams.studies import load_scenario
+
+    scenario = load_scenario(arguments.name, arguments.overrides)
+    if scenario.system != "keyhole":
+        raise ScenarioError(f"{arguments.name!r} is no keyhole operation")
+    with progress_bar("entries and trocars", "tried") as show:
+        ways = find_ways(scenario, lambda share: show(share, 1.0))
+    name = default_name(arguments.name)
+    out = arguments.out or Path("out") / f"{name}.access.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_figure(draw(ways), out)
+    print(table(ways))
+    print(out)
+    return 0
+
+
 def resect_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar resect`."""
     from diagrams.resection.console import run_console
@@ -298,6 +436,20 @@ def resect_command(arguments: argparse.Namespace) -> int:
     name = default_name(arguments.name)
     file = arguments.session or Path("out") / f"{name}.session"
     run_console(scenario, file, sys.stdin, sys.stdin.isatty())
+    return 0
+
+
+def export_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar export`."""
+    try:
+        from diagrams.resection.export import export, session_of
+    except ModuleNotFoundError as error:
+        raise ScenarioError(
+            f"no module {error.name!r}: export needs the extra, "
+            "pip install 'trocar[images]'"
+        ) from error
+    for path in export(session_of(arguments.source), arguments.to):
+        print(path)
     return 0
 
 
@@ -313,16 +465,28 @@ def campaign_command(arguments: argparse.Namespace) -> int:
     return command.campaign_command(arguments)
 
 
+def import_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar import`."""
+    from diagrams.common.importing import import_file
+
+    import_file(arguments)
+    return 0
+
+
 COMMANDS = {
     "scenarios": list_scenarios,
     "run": run_command,
     "compare": compare_command,
+    "live": live_command,
     "replay": replay_command,
     "completion": completion_command,
     "diagram": diagram_command,
     "keys": keys_command,
+    "access": access_command,
     "resect": resect_command,
+    "export": export_command,
     "campaign": campaign_command,
+    "import": import_command,
 }
 
 
@@ -350,5 +514,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"trocar: error: {reason}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("trocar: interrupted before the run began", file=sys.stderr)
+        before = " before the run began" if arguments.command == "run" else ""
+        print(f"trocar: interrupted{before}", file=sys.stderr)
         return 130

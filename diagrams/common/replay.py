@@ -18,7 +18,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RotationMatrix
 
-from diagrams.common.study import Study
+from diagrams.common.study import Study, View
 
 QUERY_PORT = "scene_graph.query"
 """The exported port of a study's diagram that Meshcat draws."""
@@ -102,16 +102,21 @@ def add_recorder(
         builder, station.GetOutputPort(QUERY_PORT), meshcat, params
     )
     visualizer.set_name("replay")
-    for path in ("/Grid", "/Axes"):
-        meshcat.SetProperty(path, "visible", False)
-    meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.97])
-    meshcat.SetProperty("/Background", "bottom_color", [0.78, 0.82, 0.86])
-    meshcat.SetCameraPose(study.view.camera, study.view.target)
+    dress(meshcat, study.view)
     # Slightly above the frame rate: frames are floor(time * rate), and a time
     # just below its exact value must not fall into the frame before.
     rate = study.frame_rate * (1.0 + 1e-9)
     meshcat.StartRecording(rate, set_visualizations_while_recording=False)
     return Recorder(meshcat, visualizer, study, speed)
+
+
+def dress(meshcat: Any, view: View) -> None:
+    """Background and camera of all that is shown."""
+    for path in ("/Grid", "/Axes"):
+        meshcat.SetProperty(path, "visible", False)
+    meshcat.SetProperty("/Background", "top_color", [0.93, 0.95, 0.97])
+    meshcat.SetProperty("/Background", "bottom_color", [0.78, 0.82, 0.86])
+    meshcat.SetCameraPose(view.camera, view.target)
 
 
 def draw_trail(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import difflib
 from pathlib import Path
 
+from plants.faults.faulty_wire import Fault
 from systems.common.parameter import parameter
 
 SCENARIO_FOLDERS = Path(__file__).parents[1]
@@ -38,6 +39,7 @@ class Scenario:
     description: str = parameter("", "one line for `trocar scenarios`")
     duration: float = parameter(10.0, "simulated time", "s", above=0.0, most=1e5)
     seed: int = parameter(0, "of all randomness of the run", least=0, most=2**63 - 1)
+    faults: list[Fault] = parameter([], "what fails, and when", shape=(-1,))
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:

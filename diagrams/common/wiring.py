@@ -1,9 +1,20 @@
 """Joining named systems: a diagram as a list of wires."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
-from diagrams.common.scenario import nearest
+from diagrams.common.scenario import ScenarioError, nearest
+from plants.faults.faulty_wire import Fault, FaultyWire
+
+PLACES = {
+    "force": "tool_wrench.wrench",
+    "frame": "optical_tracker.*_measured",
+    "estimate": "*_estimator.estimate",
+    "tension": "*.tension",
+    "arm": "joint_commands.set_point",
+}
+"""Where a kind of fault is, by its first word: at which outputs."""
 
 
 def port_of(systems: Mapping[str, Any], signal: str, output: bool) -> Any:
@@ -95,18 +106,56 @@ def add_blocks(
     return added
 
 
+def with_faults(
+    builder: Any,
+    systems: Mapping[str, Any],
+    wires: Iterable[tuple[str, str]],
+    faults: Sequence[Fault],
+) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Adds a `FaultyWire` for every fault and every output that it is at.
+
+    Returns:
+        The systems with those, and the wires through them.
+
+    Raises:
+        ScenarioError: If nothing of the kind is in the diagram.
+    """
+    systems, wires = dict(systems), list(wires)
+    for index, fault in enumerate(faults):
+        place = PLACES[fault.kind.partition("_")[0]]
+        outputs = {source for source, _ in wires if fnmatchcase(source, place)}
+        if not outputs:
+            raise ScenarioError(
+                f"faults[{index}].kind={fault.kind!r}: no wire comes from {place} here"
+            )
+        for source in sorted(outputs):
+            owner, _, port = source.partition(".")
+            known = getattr(systems[owner], "signals", {})
+            signal = known.get(port) or port_of(systems, source, True).size()
+            name = f"fault{index}_{owner}_{port}"
+            systems[name] = builder.AddNamedSystem(name, FaultyWire(fault, signal))
+            through = f"{name}.told"
+            wires = [(through if s == source else s, sink) for s, sink in wires]
+            wires.append((source, f"{name}.whole"))
+    return systems, wires
+
+
 def finish(
     builder: Any,
     name: str,
     systems: Mapping[str, Any],
     wires: Iterable[tuple[str, str]],
     signals: Mapping[str, str],
+    faults: Sequence[Fault] = (),
 ) -> Any:
     """Connects all wires, exports all signals, and builds the diagram.
+
+    What is exported is as it is, not as faults tell it.
 
     Raises:
         ValueError: For a wire or a signal to or from nowhere.
     """
+    systems, wires = with_faults(builder, systems, wires, faults)
     connect(builder, systems, wires)
     export(builder, systems, signals)
     diagram = builder.Build()

@@ -46,14 +46,14 @@ def clearance(run: Any) -> Figure:
 
 
 def forms(runs: dict[str, Any]) -> Figure:
-    """The same scene under several forms of the planner: ways, and distance left.
+    """The same scene under several forms of the planner: ways, distance left, speed.
 
     Args:
         runs: Runs of one scenario, by what to call them.
     """
     figure = new_figure(9.0, 4.4)
     axes = add_axes(figure, 1, 2, 1, projection="3d")
-    beside = add_axes(figure, 1, 2, 2)
+    beside, below = add_axes(figure, 2, 2, 2), add_axes(figure, 2, 2, 4)
     colors = [COLORS["robot"], COLORS["accent"], COLORS["muted"], COLORS["camera"]]
     first = next(iter(runs.values()))
     ends = []
@@ -73,6 +73,8 @@ def forms(runs: dict[str, Any]) -> Figure:
         axes.plot(*np.stack([p_WG[-1], tip[-1]]).T, color=color, lw=1, ls=":")
         left = np.linalg.norm(tip - logged(run, scene.target).shaft.tip * MM, axis=1)
         beside.plot(run.signals["time"], left, color=color, label=name)
+        speed = np.linalg.norm(run.navigation.tool.v, axis=1) * MM
+        below.plot(run.signals["time"], speed, color=color)
         ends += [p_WG[0], *tip[::10]]
     points = np.array(ends)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -85,8 +87,7 @@ def forms(runs: dict[str, Any]) -> Figure:
     )
     axes.set_box_aspect((1, 1, 1))
     axes.view_init(elev=24, azim=-62)
-    beside.set(
-        xlabel="time [s]", ylabel="distance from the target [mm]", ylim=(0, None)
-    )
+    beside.set(ylabel="from the target [mm]", ylim=(0, None))
+    below.set(xlabel="time [s]", ylabel="tip's speed [mm/s]", ylim=(0, None))
     beside.legend(loc="upper right")
     return figure

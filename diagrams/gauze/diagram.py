@@ -39,7 +39,9 @@ WIRES = (
     ("target.estimate", "endoscope.target"),
     # Figure 2's feedback: where the robot's tool is.
     ("plant.pa10_state", "robot_location.arm_state"),
+    ("plant.pa10_state", "joint_commands.arm_state"),
     ("fulcrum.y0", "robot_location.fulcrum"),
+    ("fulcrum.y0", "joint_commands.fulcrum"),
     # Figure 4, the local planner: three behaviours and the fuzzy decision.
     ("robot_location.robot_tool", "go_to_target.robot_tool"),
     ("obstacles.estimates", "go_to_target.obstacles"),
@@ -85,12 +87,14 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
     wires = [
         ("tracker_noise.output", "optical_tracker.noise"),
         ("endoscope.shaft", f"posed_tools.{scenario.camera.name}"),
+        ("endoscope.shaft", f"clearance.{scenario.camera.name}"),
     ]
     for name, tool in hands(scenario.tools, scenario.seed).items():
         wires += [
             (f"{name}_tool.shaft", f"optical_tracker.{name}"),
             (f"optical_tracker.{name}_measured", f"{name}_estimator.measurement"),
             (f"{name}_tool.shaft", f"posed_tools.{name}"),
+            (f"{name}_tool.shaft", f"clearance.{name}"),
         ]
         if tool.hunt.speed:
             wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))
@@ -104,6 +108,7 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
 
 TOLD = (
     ("fulcrum.y0", "robot_location.fulcrum"),
+    ("fulcrum.y0", "joint_commands.fulcrum"),
     ("tool_navigation.tool", "joint_commands.tool"),
 )
 """The wires that the passive wrist takes the place of."""
@@ -111,6 +116,7 @@ TOLD = (
 EMULATED = (
     *WRIST_WIRES,
     ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("tool_navigation.tool", "passive_wrist.tool_wanted"),
     ("passive_wrist.permission", "tool_navigation.permission"),
     ("passive_wrist.permission", "clearance_constraint.permission"),
@@ -273,4 +279,4 @@ def make_gauze_diagram(
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
     wires, exports = wiring(scenario, systems)
-    return finish(builder, "gauze_delivery", systems, wires, exports)
+    return finish(builder, "gauze_delivery", systems, wires, exports, scenario.faults)

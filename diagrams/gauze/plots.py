@@ -7,7 +7,8 @@ import numpy as np
 
 from diagrams.bedside import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
-from diagrams.gauze.bypass_plots import clearance
+from diagrams.gauze.bypass_plots import clearance, forms
+from diagrams.gauze.scenario import PAPER
 from diagrams.gauze.tools import TARGET, gap, logged
 from systems.common.geometry import closest_points
 
@@ -163,6 +164,8 @@ def plots(run: Any) -> dict[str, Figure]:
         "virtual_force": virtual_force(run),
         "clearance": clearance(run),
     }
+    if PAPER in run.case.companions:
+        figures["forms"] = forms({"bypass": run, PAPER: run.case.companions[PAPER]})
     if run.scenario.emulated:
         start = run.scenario.measure_from
         figures["forces"] = wrist_plots.forces({run.scenario.wrist: run}, start)

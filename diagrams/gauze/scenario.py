@@ -63,6 +63,9 @@ class GauzeScenario(Scenario, WristSettings):
     time_ratio: bool = parameter(
         False, "whether it is run without O as well, for the figure `time_ratio`"
     )
+    compare: bool = parameter(
+        False, "whether the paper's planner is run as well and drawn beside it"
+    )
     tracker: OpticalTrackerParams = part(OpticalTrackerParams)
     estimator: TrajectoryEstimatorParams = part(TrajectoryEstimatorParams)
     margins: Margins = part(Margins)
@@ -112,19 +115,27 @@ LEAST_FULCRUM_DISTANCE = 0.02
 WITHOUT_OBSTACLE = "without obstacle"
 """Name of the run that `time_ratio` compares with."""
 
+PAPER = "the paper's planner"
+"""Name of the run that `compare` draws beside it."""
+
 WITHDRAWN = 0.01
 """Depth of O's tip where it is out of everybody's way [m]."""
 
 
 def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
-    """The scenario with O withdrawn to its trocar, if `time_ratio` asks for it."""
+    """With O withdrawn to its trocar for `time_ratio`, the paper's for `compare`."""
+    found = {}
+    alone = replace(scenario, time_ratio=False, compare=False)
+    if scenario.compare:
+        free = replace(scenario.clearance_constraint, active=False)
+        found[PAPER] = replace(alone, behaviour="field", clearance_constraint=free)
     if not scenario.time_ratio:
-        return {}
+        return found
     tools = [
         withdrawn(t) if isinstance(t, HandTool) and t.role == OBSTACLE else t
         for t in scenario.tools
     ]
-    return {WITHOUT_OBSTACLE: replace(scenario, tools=tools, time_ratio=False)}
+    return found | {WITHOUT_OBSTACLE: replace(alone, tools=tools)}
 
 
 def withdrawn(tool: HandTool) -> HandTool:
@@ -138,13 +149,14 @@ def withdrawn(tool: HandTool) -> HandTool:
 
 def check(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    _check_tools(scenario)
+    check_tools(scenario)
     check_wrist(scenario)
-    _check_fulcrums(scenario)
+    check_fulcrums(scenario)
     _check_reach(scenario)
 
 
-def _check_tools(scenario: GauzeScenario) -> None:
+def check_tools(scenario: GauzeScenario) -> None:
+    """Raises ScenarioError for tools that cannot be."""
     names = [tool.name for tool in scenario.tools]
     for name in names:
         if names.count(name) > 1 or not name.isidentifier():
@@ -155,6 +167,11 @@ def _check_tools(scenario: GauzeScenario) -> None:
         if len(scenario.of_role(role)) != 1:
             called = [tool.name for tool in scenario.of_role(role)]
             raise ScenarioError(f"tools of role {role!r}={called}: expected one")
+    if not scenario.obstacles:
+        raise ScenarioError(
+            f"tools={names}: expected at least one of role {OBSTACLE!r}; a tool that "
+            "stays in its trocar is out of the way"
+        )
     for tool in scenario.of_role(TARGET) + scenario.obstacles:
         if tool.hunt.speed and tool.recording:
             raise ScenarioError(
@@ -170,7 +187,8 @@ def _check_tools(scenario: GauzeScenario) -> None:
                 )
 
 
-def _check_fulcrums(scenario: GauzeScenario) -> None:
+def check_fulcrums(scenario: GauzeScenario) -> None:
+    """Raises ScenarioError for trocars that are too close to each other."""
     fulcrums = {"robot": scenario.robot.p_WG}
     fulcrums |= {tool.name: tool.p_WG for tool in scenario.tools}
     names = list(fulcrums)

@@ -8,17 +8,18 @@ from plants.instruments.clearance import add_clearance
 from plants.instruments.posed_tools import PosedToolsParams, add_posed_tools
 
 
-def add_theatre(builder: Any, scenario: Any) -> Bedside:
+def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> Bedside:
     """Adds arm, instrument, abdomen and the surgeon's tools to a diagram.
 
     Args:
         builder: The diagram's builder.
         scenario: A gauze scenario.
+        bedside: Arm, instrument and abdomen, if they are there already.
 
     Raises:
         ValueError: If the start cannot be reached.
     """
-    bedside = add_bedside(builder, scenario)
+    bedside = bedside or add_bedside(builder, scenario)
     plant, scene_graph = bedside.systems["plant"], bedside.systems["scene_graph"]
     tools = [(tool.name, tool.role) for tool in scenario.tools]
     looks = PosedToolsParams(
@@ -29,9 +30,10 @@ def add_theatre(builder: Any, scenario: Any) -> Bedside:
     bedside.systems["posed_tools"] = posed
     bedside.systems["clearance"] = add_clearance(
         builder,
+        plant,
         scene_graph,
         bedside.instrument.shaft_geometry,
-        posed.shafts,
+        posed,
         in_the_way(scenario.tools),
     )
     return bedside

@@ -11,6 +11,8 @@ from pydrake.systems.primitives import RandomSource
 from diagrams.bedside.bedside import add_bedside
 from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.common.wiring import add_blocks, finish
+from diagrams.gauze import diagram as gauze
+from diagrams.gauze.theatre import add_theatre
 from diagrams.keyhole.operation import KeyholeCase
 from diagrams.keyhole.scenario import KeyholeScenario
 from diagrams.snake.diagram import DRUM_WIRES, WIRES
@@ -22,6 +24,7 @@ from plants.tissue.tissue_carver import Carving, TissueCarver
 from systems.keyhole.phases import OperationPhases
 from systems.keyhole.snake_load import SnakeLoad, weight_of
 from systems.keyhole.snake_task import SnakeTask
+from systems.keyhole.station_target import StationTarget
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask
 from systems.motion.joint_commands import JointCommands
@@ -43,13 +46,15 @@ KEYHOLE_WIRES = (
     *WRIST_WIRES,
     ("plant.pa10_state", "robot_location.arm_state"),
     ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("plant.pa10_state", "joint_commands.arm_state"),
+    ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("joint_commands.set_point", "plant.pa10_desired_state"),
     # The snake's weight shifts along the tube.
     ("snake_location.posture", "snake_load.posture"),
     ("snake_load.load", "tool_wrench.load"),
     # The organ: seen by the tracker, predicted.
     ("organ_shaft.y0", "organ_tracker.organ"),
-    ("tracker_noise.output", "organ_tracker.noise"),
+    ("organ_noise.output", "organ_tracker.noise"),
     ("organ_tracker.organ_measured", "organ_estimator.measurement"),
     # The statechart.
     ("tube_task.status", "phases.tube"),
@@ -57,7 +62,7 @@ KEYHOLE_WIRES = (
     ("organ_estimator.motion", "phases.organ"),
     ("fulcrum_estimator.estimate", "phases.fulcrum"),
     ("tool_wrench.shaft", "phases.shaft"),
-    ("tool_wrench.wrench", "phases.wrench"),
+    ("wrench_watch.believed", "phases.wrench"),
     ("passive_wrist.permission", "phases.permission"),
     ("wire_watch.alarm", "phases.alarm"),
     # The tube follows the organ, through the passive wrist.
@@ -67,6 +72,8 @@ KEYHOLE_WIRES = (
     ("tube_task.tool", "passive_wrist.tool_wanted"),
     # The snake does the rest.
     ("plant.pa10_state", "tube_location.arm_state"),
+    ("joint_commands.posture", "tube_location.posture"),
+    ("joint_commands.next", "tube_location.next"),
     ("phases.phase", "snake_task.phase"),
     ("tube_location.tube", "snake_task.tube"),
     ("organ_estimator.ahead", "snake_task.organ"),
@@ -100,6 +107,37 @@ EXPORTS = WRIST_EXPORTS | {
     "watch.alarm": "wire_watch.alarm",
     "scene_graph.query": "scene_graph.query",
 }
+
+KEPT = ("joint_commands", "robot_location")
+"""Blocks of a gauze delivery that are this diagram's own."""
+
+PLANNER_WIRES = (
+    ("organ_estimator.motion", "station_target.organ"),
+    ("passive_wrist.permission", "tool_navigation.permission"),
+    ("passive_wrist.permission", "clearance_constraint.permission"),
+    ("tool_navigation.tool", "tube_task.planned"),
+)
+
+
+def theatre_wires(
+    scenario: KeyholeScenario, blocks: Mapping[str, Any]
+) -> tuple[list[tuple[str, str]], dict[str, str]]:
+    """The wires of the surgeon's tools and the planner, and what is exported."""
+    surgeon = scenario.surgeon
+    wires, exports = gauze.wiring(surgeon, blocks)
+    target = gauze.aliases(surgeon)["target.estimate"]
+    own = {source for _, source in KEYHOLE_WIRES}
+    led = [
+        ("station_target.estimate" if source == target else source, sink)
+        for source, sink in wires
+        if sink not in own
+        and not sink.startswith(("joint_commands.", "passive_wrist."))
+        and (source, sink) not in WRIST_WIRES
+    ]
+    taken = {sink for _, sink in PLANNER_WIRES}
+    led = [wire for wire in led if wire[1] not in taken]
+    return [*led, *PLANNER_WIRES], exports
+
 
 CARVER_EXPORTS = {
     "tissue.index": "tissue_carver.index",
@@ -140,14 +178,14 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
     blocks = {
         "snake_load": SnakeLoad(o.snake, o.drive, s.instrument),
         "organ_tracker": OpticalTracker(s.organ_tracker, ["organ"]),
-        "tracker_noise": RandomSource(
+        "organ_noise": RandomSource(
             RandomDistribution.kGaussian, 6, s.organ_tracker.period
         ),
         "organ_estimator": OrganEstimator(s.organ_estimator),
         "phases": OperationPhases(s.phases),
         "tube_task": TubeTask(s.tube_task, s.robot.p_WP, s.entry.p_WE, s.axis.tolist()),
         "snake_task": task,
-        "tube_location": TubeLocation(tube_known, o.period),
+        "tube_location": TubeLocation(tube_known),
         "robot_location": RobotLocation(tube_known),
         "joint_commands": JointCommands(s.joints, posture.tolist(), s.arm, tube_known),
         "resection_ik": ResectionIk(
@@ -200,7 +238,13 @@ def make_keyhole_diagram(
     bedside = add_bedside(builder, s, hang)
     plant = bedside.systems["plant"]
     tube = int(bedside.instrument.body.index())
-    blocks = add_blocks(builder, make_blocks(case, bedside.posture, tube), swaps)
+    own = make_blocks(case, bedside.posture, tube)
+    if s.others:
+        add_theatre(builder, s.surgeon, bedside)
+        planner = gauze.make_blocks(s.surgeon, bedside.posture)
+        own |= {name: planner[name] for name in planner if name not in KEPT}
+        own["station_target"] = StationTarget(s.tube_task.standoff, s.axis.tolist())
+    blocks = add_blocks(builder, own, swaps)
     set_default_posture(plant, added[0], blocks["snake_task"].inside)
     motion = organ_trajectory(s.organ_motion, s.wall_motion, s.entry.p_WE, s.duration)
     source, shaft = add_organ_motion(builder, motion, s.axis)
@@ -209,4 +253,7 @@ def make_keyhole_diagram(
     wires, exports = KEYHOLE_WIRES, EXPORTS
     if case.resection is not None:
         wires, exports = wires + CARVER_WIRES, exports | CARVER_EXPORTS
-    return finish(builder, "keyhole", systems, wires, exports)
+    if s.others:
+        more, shown = theatre_wires(s, systems)
+        wires, exports = (*wires, *more), shown | exports
+    return finish(builder, "keyhole", systems, wires, exports, s.faults)

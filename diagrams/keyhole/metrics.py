@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.bedside.wrist_metrics import rms
+from diagrams.gauze.tools import OBSTACLE, in_the_way
 from diagrams.resection.metrics import outside_depth
 from plants.tissue.labels import CRITICAL
 from systems.keyhole.phases import REASONS, Phases, Reason
@@ -95,6 +96,11 @@ def measure(run: Any) -> dict[str, Any]:
         "stops": [one for one in phases if one["phase"] == "stopped"],
         "phases": phases,
     }
+    if run.scenario.others:
+        tools = in_the_way(run.scenario.theatre.tools)
+        moving = [role == OBSTACLE for _, role in tools]
+        gaps = run.clearance.distance[:, moving]
+        figures["min_tool_clearance"] = float(gaps.min())
     if run.case.resection is not None:
         figures |= resected(run)
     return figures

@@ -8,23 +8,28 @@ import numpy as np
 from diagrams.bedside.bedside import ToolAtStart
 from diagrams.bedside.wrist import WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
+from diagrams.gauze.tools import CameraTool
 from diagrams.resection.scenario import ResectionScenario
 from diagrams.resection.scenario import check as check_resection
 from plants.abdomen.abdomen import AbdomenParams
 from plants.abdomen.organ_motion import OrganMotionParams
 from plants.arm.arm import ArmParams
+from plants.instruments.instrument import InstrumentParams
 from plants.instruments.tube import TubeParams
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.parameters import SnakeParams
 from plants.snake.reachability import why_not
 from plants.surgeon.recording import load_recording
 from plants.tissue.volume import Access
+from systems.bypass.obstacle_tools import Margins
 from systems.common.parameter import Rules, parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
 from systems.keyhole.snake_task import SnakeTaskParams
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
+from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
 from systems.resection.wires.wire_drums import WireDrumsParams
@@ -33,6 +38,8 @@ from systems.sensing.organ_estimator import OrganEstimatorParams
 
 TASKS = ("circle", "resect")
 PERIOD = 1.0 / 120.0
+BASE = 2e-3
+"""How far the snake's base may stand within the tube at work, in m."""
 TURN = 120
 """Postures of a turn of the circle."""
 
@@ -111,6 +118,41 @@ class OrganTracker(OpticalTrackerParams):
 
 
 @dataclass
+class SteadyFulcrum(FulcrumParams):
+    """For minutes under a tip that follows an organ."""
+
+    steady: bool = parameter(
+        True, "whether it is kept from drifting along the shaft, over minutes"
+    )
+
+
+@dataclass
+class WideMargins(Margins):
+    """A tube of 10 mm needs 2.5 mm more than an instrument of 5."""
+
+    safe_distance: float = parameter(
+        0.0095, "D_safe, that is held", "m", least=0.005, most=0.03
+    )
+    plan_distance: float = parameter(
+        0.012, "D, that ways are planned with", "m", least=0.005, most=0.05
+    )
+    camera_distance: float = parameter(
+        0.012, "D_safe of the endoscope", "m", least=0.0075, most=0.05
+    )
+    avoid_target: bool = parameter(False, "the station has no shaft to be avoided")
+
+
+@dataclass
+class Theatre(GauzeScenario):
+    """The surgeon's tools, and the local planner that leads round them.
+
+    The station takes the place of the target; the tool called target is withdrawn.
+    """
+
+    margins: WideMargins = part(WideMargins)
+
+
+@dataclass
 class Entry:
     """Where the organ is entered, the breath in its middle."""
 
@@ -124,14 +166,13 @@ class KeyholeScenario(Scenario, WristSettings):
     """One patient, one plant: tube and snake through the trocar of who breathes."""
 
     task: str = parameter("circle", "what the tool does in the organ", choices=TASKS)
-    known_organ: bool = parameter(
-        False, "whether the organ's motion is told, for comparison"
+    others: bool = parameter(
+        False, "whether the surgeon's tools are there, and are planned round"
     )
-    snake_follows: bool = parameter(
-        True, "whether the snake makes up for what the tube misses, for comparison"
-    )
+    theatre: Theatre = part(Theatre)
     robot: ToolAtStart = part(ToolAtStart)
     entry: Entry = part(Entry)
+    fulcrum_estimator: SteadyFulcrum = part(SteadyFulcrum)
     organ_motion: OrganMotionParams = part(OrganMotionParams)
     organ_tracker: OrganTracker = part(OrganTracker)
     organ_estimator: OrganEstimatorParams = part(OrganEstimatorParams)
@@ -173,13 +214,31 @@ class KeyholeScenario(Scenario, WristSettings):
     def planned(self) -> OrganOperation:
         """The resection with a snake whose base stays out of the tube."""
         snake = self.operation.snake
-        travel = [-self.instrument.gap, snake.travel[1]]
+        travel = [-self.instrument.gap - BASE, snake.travel[1]]
         player = replace(self.operation.player, lead=self.operation.period)
         return replace(
             self.operation,
             seed=self.seed,
             snake=replace(snake, travel=travel),
             player=player,
+        )
+
+    @property
+    def surgeon(self) -> Theatre:
+        """The theatre with the robot and the patient of this scenario."""
+        return replace(
+            self.theatre,
+            seed=self.seed,
+            duration=self.duration,
+            wrist="pwe",
+            robot=self.robot,
+            instrument=InstrumentParams(length=self.instrument.length),
+            tools=[
+                replace(tool, p_WS=self.entry.p_WE)
+                if isinstance(tool, CameraTool)
+                else tool
+                for tool in self.theatre.tools
+            ],
         )
 
     @property
@@ -217,6 +276,9 @@ def check(scenario: KeyholeScenario) -> None:
     _check_reach(scenario)
     if scenario.task == "circle":
         circle_postures(scenario)
+    if scenario.others:
+        check_tools(scenario.surgeon)
+        check_fulcrums(scenario.surgeon)
     if scenario.organ_motion.recording:
         load_recording(scenario.organ_motion.recording)
 

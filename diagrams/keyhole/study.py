@@ -7,6 +7,7 @@ from pydrake.systems.analysis import SimulatorConfig
 from diagrams.bedside.bedside import stiffen
 from diagrams.bedside.wrist import WRIST_SIGNALS
 from diagrams.common.study import Study, View, cenic
+from diagrams.gauze.tools import gather, in_the_way
 from diagrams.keyhole.diagram import make_keyhole_diagram
 from diagrams.keyhole.metrics import measure
 from diagrams.keyhole.operation import LOG_PERIOD, length, outline, prepare
@@ -14,11 +15,14 @@ from diagrams.keyhole.plots import plots
 from diagrams.keyhole.replay import decorate
 from diagrams.keyhole.scenario import KeyholeScenario, check
 from plants.abdomen.wall_force import FulcrumError
+from plants.instruments.clearance import Gap, column
 from plants.snake.signals import ToolPose
 from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
-from systems.common.signals import Force, MovingPoint, RobotTool
+from systems.common.signal import Many
+from systems.common.signals import Force, MovingPoint, RobotTool, Shaft
 from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
 from systems.motion.joint_commands import Status
+from systems.motion.tool_navigation import StopCode
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
 from systems.resection.wires.wire_drums import Limited
@@ -53,7 +57,21 @@ TISSUE = {
 
 def signals(scenario: KeyholeScenario) -> dict[str, Any]:
     """What is logged: tissue only where there is some."""
-    return SIGNALS | (TISSUE if scenario.task == "resect" else {})
+    found: dict[str, Any] = SIGNALS | (TISSUE if scenario.task == "resect" else {})
+    if scenario.others:
+        near = in_the_way(scenario.theatre.tools)
+        columns = tuple(column(name, role, near) for name, role in near)
+        found |= {"clearance": Many(Gap, columns), "navigation.stop": StopCode}
+        found |= {f"{tool.name}.shaft": Shaft for tool in scenario.theatre.obstacles}
+    return found
+
+
+def gather_tools(tree: dict[str, Any]) -> None:
+    """Brings the theatre's tools into their list, in place."""
+    theatre = tree.get("theatre", {})
+    if isinstance(theatre, dict):
+        gather(theatre)
+        tree["theatre"] = theatre
 
 
 def integrator(scenario: KeyholeScenario) -> SimulatorConfig:
@@ -78,8 +96,9 @@ STUDY = Study(
     adjust=stiffen,
     integrator=integrator,
     required=("system", "duration", "task", "robot.p_WG", "robot.p_WP"),
-    view=View(camera=(0.42, -0.60, 0.16), target=(-0.06, 0.0, 0.0)),
-    close_up=View(camera=(0.07, -0.13, -0.08), target=(0.0, 0.0, -0.115)),
+    view=View(camera=(0.36, -0.52, 0.12), target=(-0.04, 0.0, -0.02)),
+    close_up=View(camera=(0.055, -0.10, -0.085), target=(0.0, 0.0, -0.112)),
+    gather=gather_tools,
     length=length,
     prepare=prepare,
     outline=outline,

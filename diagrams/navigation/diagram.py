@@ -135,4 +135,4 @@ def make_navigation_diagram(
     )
     blocks = add_blocks(builder, make_blocks(scenario), swaps)
     systems = {"scene_graph": scene_graph, "arena": arena} | blocks
-    return finish(builder, "navigation", systems, WIRES, EXPORTS)
+    return finish(builder, "navigation", systems, WIRES, EXPORTS, scenario.faults)

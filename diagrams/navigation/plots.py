@@ -8,9 +8,14 @@ from matplotlib.patches import Circle
 import numpy as np
 
 from diagrams.common.plots import COLORS, add_axes, new_figure
-from diagrams.navigation.figures import thesis_figures, total_potential
+from diagrams.navigation.figures import (
+    field_along,
+    thesis_figures,
+    total_potential,
+)
 from diagrams.navigation.metrics import gaps, goal_distance
 from diagrams.navigation.scenario import discs
+from systems.switching.classical_planner import ClassicalParams
 from systems.switching.signals import Seen
 from systems.switching.statechart_planner import STATES
 from systems.switching.switching_state import MODES
@@ -128,15 +133,14 @@ def motion(run: Any) -> Figure:
 
 
 def potential(run: Any, runs: dict[str, Any]) -> Figure:
-    """The classical total potential of the world, and the ways (Figures 7, 8)."""
+    """The classical total potential of the world, and the ways (Figure 8)."""
     s = run.scenario
-    world = [Seen(float(k), *disc) for k, disc in enumerate(discs(s))]
+    params, world = classical_world(s)
     middle = 0.5 * (np.array(s.start) + s.goal)
     half = np.maximum(np.abs(middle - s.start) + 1.0, 3.5)
     low, high = middle - half, middle + half
     figure = new_figure(7.5, 6.0)
     axes = add_axes(figure, 1, 1, 1)
-    params = replace(s.classical, body_radius=s.robot.radius, speed=s.robot.speed)
     total_potential(axes, params, world, s.goal, low, high)
     draw_world(axes, run)
     draw_ways(axes, runs)
@@ -146,11 +150,21 @@ def potential(run: Any, runs: dict[str, Any]) -> Figure:
     return figure
 
 
+def classical_world(scenario: Any) -> tuple[ClassicalParams, list[Seen]]:
+    """The classical method's parameters, and what it sees at time zero."""
+    body = scenario.robot
+    params = replace(scenario.classical, body_radius=body.radius, speed=body.speed)
+    return params, [Seen(float(k), *disc) for k, disc in enumerate(discs(scenario))]
+
+
 def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
     runs = {run.scenario.planner: run, **run.case.companions}
     figures = {"path": path(run, runs), "motion": motion(run)}
     if run.scenario.thesis_figures:
         figures["potential"] = potential(run, runs)
+        params, world = classical_world(run.scenario)
+        ends = run.scenario.start, run.scenario.goal
+        figures["field_along"] = field_along(params, world, *ends)
         figures |= thesis_figures()
     return figures

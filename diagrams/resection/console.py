@@ -10,10 +10,12 @@ import shlex
 
 from diagrams.common.progress import progress_bar
 from diagrams.common.scenario import refusals
-from diagrams.resection.operation import finish_plan, new_session, reach_of
+from diagrams.resection.operation import finish_plan, new_session, reach_of, resumed
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.labels import TUMOUR
+from plants.tissue.mask import load_mask
 from systems.resection.planning.feasibility_map import feasibility_map
+from systems.resection.planning.next_entry import NextEntry, next_entries
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import (
     ELEMENTARY,
@@ -24,7 +26,7 @@ from systems.resection.planning.procedure import (
     load_procedures,
     save_procedures,
 )
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.session import Session
 
 HELP = """\
 entry LENGTH RADIUS                  propose an entry procedure [mm]
@@ -35,6 +37,8 @@ suggest                              propose what gains most of some the planner
 check | commit | undo                ask of the proposal, make it part of the plan
 map                                  where elementary volumes are feasible now
 finish                               let the planner do the rest
+entries | access N                   what further entries would add | take the N-th
+update FILE                          an image taken meanwhile replaces the mask
 list | quit                          the plan; the session is saved
 save FILE | load FILE                its procedures as JSON; commit those of a file"""
 
@@ -71,6 +75,7 @@ class Console:
         self.session = session
         self.scenario = scenario
         self.proposal: Procedure | None = None
+        self.further: list[NextEntry] = []
 
     def answer(self, line: str) -> str:
         """Does what a line says; bad input is answered, never raised."""
@@ -99,8 +104,23 @@ class Console:
             return self._map()
         if command == "finish":
             reach = reach_of(self.session, self.scenario, progress_bar)
-            finish_plan(self.session, reach, self.scenario, progress_bar)
+            reach = finish_plan(self.session, reach, self.scenario, progress_bar)
             return f"{self._share()}, {100 * reach.fraction:.1f} % are reachable"
+        if command == "entries":
+            with progress_bar("further entries", "of those tried") as show:
+                self.further = next_entries(
+                    self.session,
+                    self.scenario.entries,
+                    self.scenario.seed,
+                    lambda share: show(share, 1.0),
+                )
+            rows = [entry.text(self.session.volume) for entry in self.further]
+            return "\n".join(f"{n}: {row}" for n, row in enumerate(rows, 1)) or "none"
+        if command == "access":
+            return self._access(words[1:])
+        if command == "update" and len(words) == 2:
+            self.session.update(load_mask(words[1], self.scenario.labels))
+            return f"updated; {self._share()}"
         if command == "list":
             rows = [
                 f"{n}: {step.name}, {1e9 * step.gained:.0f} mm3"
@@ -114,6 +134,17 @@ class Console:
         if command == "load" and len(words) == 2:
             return self._load(Path(words[1]))
         return HELP
+
+    def _access(self, words: list[str]) -> str:
+        chosen = int(words[0]) if len(words) == 1 and words[0].isdigit() else 0
+        if not 1 <= chosen <= len(self.further):
+            raise ValueError(
+                f"access {' '.join(words)}: expected one number, 1 to "
+                f"{len(self.further)}, of the list that `entries` gives"
+            )
+        step = self.session.enter_anew(self.further[chosen - 1].X_WE)
+        self.further = []
+        return f"{step.name}; {self._share()}"
 
     def _suggest(self) -> str:
         tumour = self.session.volume.labels == TUMOUR
@@ -172,9 +203,9 @@ def open_session(scenario: ResectionScenario, file: Path) -> Session:
         ScenarioError: If the file is damaged or the scenario makes no session.
     """
     with refusals():
-        if file.exists():
-            return load_session(file)
         session, _ = new_session(scenario)
+        if file.exists():
+            session = resumed(file, session)
     session.file = file
     session.save(file)
     return session

@@ -112,4 +112,6 @@ def make_resection_diagram(
     set_default_posture(plant, snake, session.postures[case.done.posture])
     blocks = add_blocks(builder, make_blocks(case), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
-    return finish(builder, "resection", systems, RESECTION_WIRES, EXPORTS)
+    return finish(
+        builder, "resection", systems, RESECTION_WIRES, EXPORTS, case.scenario.faults
+    )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.tissue.labels import BRAIN, CAP, CRITICAL
+from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL
 from plants.tissue.space import SOLID
 from systems.resection.planning.next_entry import bored_healthy
 from systems.resection.planning.session import STROKES, Session
@@ -54,11 +54,15 @@ def measure(run: Any) -> dict[str, Any]:
     error = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
     volume = session.volume.tumour_volume
     steps, runs = session.steps, freeing_runs(session)
-    cap = int(np.count_nonzero(session.volume.labels == CAP)) * session.volume.voxel
+    cap, channel = (
+        int(np.count_nonzero(session.volume.labels == label)) * session.volume.voxel
+        for label in (CAP, CHANNEL)
+    )
     return {
         "tumour_volume": volume,
         "mask_volume": session.volume.mask_volume,
         "cap_volume": cap,
+        "channel_volume": channel,
         "reachable_fraction": reach.fraction,
         "planned_fraction": session.fraction,
         "resected_fraction": float(removed.tumour[-1]) / volume,
@@ -71,6 +75,7 @@ def measure(run: Any) -> dict[str, Any]:
         "procedures": sum(step.kind not in ("home", STROKES) for step in steps),
         "strokes": len(runs),
         "single_step_share": single_step_share(runs),
+        "access_time": run.case.access_time,
         "planning_time": run.case.planning_time,
         "reach_time": reach.time,
         "execution_time": run.case.done.time + run.simulated,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.common.case import Case
-from diagrams.common.progress import Progress
+from diagrams.common.progress import Progress, silent
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.execution import Execution, load_execution
@@ -31,7 +31,7 @@ from systems.resection.planning.reach import (
     load_reach,
     save_reach,
 )
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.session import UPDATE, Session, load_session
 from systems.resection.wires.procedure_player import schedule
 
 LOG_PERIOD = 0.1
@@ -47,6 +47,7 @@ class Operation(Case):
         tumour: Its name.
         reach: The reachable part; None if nothing was planned.
         refusals: What was refused: procedure, reason, where [m], gap [m].
+        access_time: Of proposing the entry and setting the session up, in s.
         planning_time: Of the procedures' checks and the planner, in s.
         done: What earlier runs carried out of the plan.
     """
@@ -55,6 +56,7 @@ class Operation(Case):
     tumour: str
     reach: Reach | None = None
     refusals: list[dict[str, Any]] = field(default_factory=list)
+    access_time: float = 0.0
     planning_time: float = 0.0
     done: Execution = field(default_factory=Execution)
 
@@ -74,12 +76,17 @@ def tissue_of(scenario: ResectionScenario) -> Tissue:
     return synthetic_tumour(scenario.tumour)
 
 
-def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
+def new_session(
+    scenario: ResectionScenario, progress: Progress = silent
+) -> tuple[Session, str]:
     """A session at its beginning, and the tumour's name."""
     tissue = tissue_of(scenario)
     access = scenario.access
     if access.direction is None:
-        access = propose_access(tissue, access, scenario.snake).access
+        with progress("where to enter", "of what is tried") as show:
+            access = propose_access(
+                tissue, access, scenario.snake, progress=lambda share: show(share, 1.0)
+            ).access
     volume = make_volume(
         tissue,
         access,
@@ -92,6 +99,40 @@ def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
         print(f"trocar: {tissue.name}: {note}", file=sys.stderr)
     session = Session(volume, scenario.snake, scenario.clearance, scenario.accuracy)
     return session, tissue.name
+
+
+def resumed(file: Path, fresh: Session) -> Session:
+    """The session of a file, which must be one of the same operation.
+
+    Args:
+        file: It is there.
+        fresh: The operation at its beginning.
+
+    Raises:
+        ScenarioError: If it is another's; what differs is named.
+        ValueError: If the file is damaged.
+    """
+    session = load_session(file)
+    old, new = session.volume, fresh.volume
+    updated = any(step.kind == UPDATE for step in session.steps)  # it shows another
+    same = old.labels.shape == new.labels.shape and (
+        updated or bool((old.labels == new.labels).all())
+    )
+    pairs = {"tumour or access": (bool(same), True), "margin": (old.margin, new.margin)}
+    pairs |= {
+        name: (getattr(session, name), getattr(fresh, name))
+        for name in ("clearance", "accuracy")
+    }
+    told = vars(session.params)
+    pairs |= {f"snake.{k}": (told[k], v) for k, v in vars(fresh.params).items()}
+    differs = [
+        f"{k} ({was} there, {is_now} here)"
+        for k, (was, is_now) in pairs.items()
+        if was != is_now
+    ]
+    if differs:
+        raise ScenarioError(f"session {str(file)!r} differs in {', '.join(differs)}")
+    return session
 
 
 def outline(scenario: ResectionScenario) -> Operation:
@@ -112,13 +153,11 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
         ValueError: If tumour, access or session's files make no sense.
     """
     file = Path(scenario.session) if scenario.session else None
-    session, tumour = new_session(scenario)
+    start = perf_counter()
+    session, tumour = new_session(scenario, progress)
+    access_time = perf_counter() - start
     if file is not None and file.is_file():
-        fresh, session = session, load_session(file)
-        if session.volume.labels.shape != fresh.volume.labels.shape or (
-            (session.volume.labels != fresh.volume.labels).any()
-        ):
-            raise ScenarioError(f"session {str(file)!r} is of another tumour or access")
+        session = resumed(file, session)
     session.file = file
     reach = reach_of(session, scenario, progress)
     start = perf_counter()
@@ -144,13 +183,16 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
     planning_time = perf_counter() - start
     done = Execution()
     if file is not None:
-        done = load_execution(beside(file, "executed"), session.postures)
+        done = load_execution(
+            beside(file, "executed"), session.postures, session.volume.labels.shape
+        )
     return Operation(
         scenario,
         session=session,
         tumour=tumour,
         reach=reach,
         refusals=refusals,
+        access_time=access_time,
         planning_time=planning_time,
         done=done,
     )

@@ -184,8 +184,8 @@ def _figures(m: dict[str, Any]) -> str:
     critical, mask = m["min_critical_distance"], m["mask_volume"]
     rows = [
         f"tumour {1e6 * m['tumour_volume']:.2f} cm³ (without the channel's cap of "
-        f"{1e6 * m['cap_volume']:.2f} cm³)"
-        + (f", in the mask {1e6 * mask:.2f} cm³" if mask else ""),
+        f"{1e6 * m['cap_volume']:.2f} cm³; it bores {1e6 * m['channel_volume']:.2f} "
+        "cm³ of brain here)" + (f", in the mask {1e6 * mask:.2f} cm³" if mask else ""),
         f"reachable {100 * m['reachable_fraction']:.1f} %, planned "
         f"{100 * m['planned_fraction']:.1f} %, resected "
         f"{100 * m['resected_fraction']:.1f} % of the tumour",
@@ -195,6 +195,8 @@ def _figures(m: dict[str, Any]) -> str:
         if critical is None
         else f"nearest to what is critical {1e3 * critical:.2f} mm",
         f"body in tissue at {m['body_collisions']} checks",
+        f"{m['entries']} entries, the further ones bored "
+        f"{1e6 * m['bored_healthy']:.2f} cm³ of healthy tissue",
         f"{m['procedures']} procedures, {m['strokes']} strokes; single steps "
         f"{100 * m['single_step_share']:.1f} %",
         f"planned in {m['planning_time']:.1f} s, reach in {m['reach_time']:.1f} s",
@@ -212,7 +214,8 @@ def _figures(m: dict[str, Any]) -> str:
 
 def _stayed(case: Any) -> str:
     volume = case.session.volume
-    rows = ["what one entry cannot reach"]
+    count = 1 + len(volume.more)
+    rows = [f"what {'one entry' if count == 1 else f'{count} entries'} cannot reach"]
     for lump in case.reach.lumps[:9]:
         share = 100 * lump.volume / volume.tumour_volume
         shown = f"{share:.1f} %" if share >= 0.1 else "< 0.1 %"

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import Rgba
+from pydrake.math import RigidTransform
 
 from diagrams.resection.metrics import carving_of
 from plants.snake.last_module import meridian
@@ -73,11 +74,12 @@ def draw_tissue(
                     animation.SetProperty(0, name, "visible", False)
                 animation.SetProperty(frame, name, "visible", True)
             shown[key] = (mark, name)
+    _turn_to_entries(animation, carving_of(run).volume, first, moves, end, path)
     if (volume.labels == CRITICAL).any():
         vertices, faces = surface(
             coarse(volume.labels == CRITICAL, 1), volume.origin, volume.spacing
         )
-        meshcat.SetTriangleMesh(f"{path}vessel", vertices.T, faces.T, VESSEL)
+        meshcat.SetTriangleMesh(f"{path}tissue/vessel", vertices.T, faces.T, VESSEL)
 
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
@@ -92,6 +94,20 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     target = nearer * np.array(view.target)
     away = np.array(view.camera) - np.array(view.target)
     meshcat.SetCameraPose(target + nearer * away, target)
+
+
+def _turn_to_entries(
+    animation: Any, executed: Any, first: int, moves: float, end: float, path: str
+) -> None:
+    """Shows each entry's frame in turn: the robot stays, the tissue is turned."""
+    if not executed.more:
+        return
+    for name in (f"{path}tissue", f"{path}elementary_volumes"):
+        animation.SetTransform(0, name, RigidTransform())
+        for channel in executed.more:
+            share = max((channel.time - first) / max(moves, 1.0), 0.0)
+            X_EW = RigidTransform(np.linalg.inv(channel.X_WE))
+            animation.SetTransform(animation.frame(share * end), name, X_EW)
 
 
 def _in_blocks(

@@ -186,4 +186,4 @@ def make_snake_diagram(
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
     wires = WIRES + WIRES_OF[scenario.wires]
     exports = EXPORTS | EXPORTS_OF[scenario.wires]
-    return finish(builder, "snake", systems, wires, exports)
+    return finish(builder, "snake", systems, wires, exports, scenario.faults)

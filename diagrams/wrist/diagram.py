@@ -21,7 +21,9 @@ WIRES = (
     ("arc_navigation.tool", "passive_wrist.tool_wanted"),
     ("joint_commands.set_point", "plant.pa10_desired_state"),
     ("plant.pa10_state", "robot_location.arm_state"),
+    ("plant.pa10_state", "joint_commands.arm_state"),
     ("passive_wrist.pivot", "robot_location.fulcrum"),
+    ("passive_wrist.pivot", "joint_commands.fulcrum"),
 )
 
 EXPORTS = WRIST_EXPORTS | {
@@ -65,4 +67,4 @@ def make_wrist_diagram(
         swaps,
     )
     systems = bedside.systems | add_wrist(builder, bedside, scenario) | blocks
-    return finish(builder, "passive_wrist", systems, WIRES, EXPORTS)
+    return finish(builder, "passive_wrist", systems, WIRES, EXPORTS, scenario.faults)

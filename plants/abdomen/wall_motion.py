@@ -16,6 +16,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from plants.abdomen.abdomen import Abdomen
 from plants.abdomen.breath import Irregular
+from plants.abdomen.breathing_curve import load_curve
 from plants.common.actuation import hold_still
 from systems.common.parameter import check, parameter, part
 
@@ -40,6 +41,11 @@ class WallMotionParams:
     )
     # The ventilator's is smooth in, sharp out.
     wave: str = parameter("sine", "of the breathing", choices=WAVES)
+    curve: str = parameter(
+        "",
+        "recorded, CSV t,b within -1 and 1, again and again; a wave if empty",
+        file=True,
+    )
     phase: float = parameter(
         0.0, "of the breathing at the start, in breaths", least=-1, most=1
     )
@@ -78,6 +84,9 @@ class WallMotionParams:
         g = wave(self.wave, phase + self.phase)
         if self.irregular.disturbed:  # a deeper breath ends where all do
             g = depth * (g + 1.0) - 1.0
+        if self.curve:
+            times, curve = load_curve(self.curve)
+            g = float(np.interp(time % times[-1], times, curve))
         thrown = self.irregular.coughing(time)
         jump = 1.0 if any(self.step) and time >= self.step_time else 0.0
         r = self.risen(time)

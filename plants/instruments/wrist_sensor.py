@@ -21,6 +21,8 @@ from pydrake.multibody.tree import ModelInstanceIndex
 
 from plants.abdomen.abdomen import Abdomen
 from systems.common.block import Block
+from systems.common.compiled import compiled
+from systems.common.geometry import cross, plus, sub, xyz
 from systems.common.signal import Field, Vector, size
 
 _STILL = (0.0, 0.0, 0.0)
@@ -36,9 +38,44 @@ class Felt(NamedTuple):
     a_C: Annotated[Vector, Field("m/s^2", "of the sleeve's", _STILL)]
 
 
-_MOMENTUM = 6
 _MOVING = 6 + 6 + 3  # momentum, V_WM, v_WC
 _FELT = size(Felt)
+
+
+@compiled
+def balance(
+    rate: np.ndarray,
+    load: np.ndarray,
+    centre: np.ndarray,
+    weight: np.ndarray,
+    p_WC: np.ndarray,
+    F_C: np.ndarray,
+    p_WM: np.ndarray,
+    R_WM: np.ndarray,
+) -> np.ndarray:
+    """What is `Felt`, element by element.
+
+    Args:
+        rate: Of momentum about the world's origin, of V_WM and of v_WC, (15,).
+        load: Moment about the world's origin, and force, that are applied, (6,).
+        centre: Of all mass that has weight, in W.
+        weight: Its weight in N.
+        p_WC: Of the sleeve.
+        F_C: The bushing's torque and force on it in W, the columns of (3, 2).
+        p_WM: Of the mount.
+        R_WM: Its orientation.
+    """
+    torque, push = xyz(F_C[:, 0], 0), xyz(F_C[:, 1], 0)
+    f = sub(sub(xyz(rate, 3), xyz(load, 3)), plus(xyz(weight, 0), push))
+    m = sub(sub(xyz(rate, 0), xyz(load, 0)), plus(torque, cross(p_WC, push)))
+    m = sub(sub(m, cross(centre, weight)), cross(p_WM, f))
+    out = np.zeros(15)
+    for i in range(3):
+        for k in range(3):
+            out[i] += R_WM[k, i] * f[k]
+            out[3 + i] += R_WM[k, i] * m[k]
+    out[6:] = rate[6:]
+    return out
 
 
 class WristSensor(Block):
@@ -90,10 +127,9 @@ class WristSensor(Block):
         initial = np.zeros(_MOVING + 1 + _FELT)
         initial[_MOVING] = -1.0
         self.DeclareDiscreteState(initial)
-        ticket = {self._state.ticket()}
-        self._context = self.cached("plant_context", self._calc_context, ticket)
+        self._own = context  # to calculate in: all of it is written before it is read
         reads = {
-            self._context.ticket(),
+            self._state.ticket(),
             self._applied.ticket(),
             self.time_ticket(),
             self.xd_ticket(),
@@ -102,59 +138,49 @@ class WristSensor(Block):
         self.signal_out("felt", Felt, self._calc_felt, {self._next.ticket()})
         self.update_every(period, self._next.Eval)
 
-    def _calc_context(self, context: Any) -> Any:
-        own = self._plant.CreateDefaultContext()
-        self._plant.SetPositionsAndVelocities(own, self._state.Eval(context))
-        return own
-
     def _calc_next(self, context: Any) -> np.ndarray:
         """The state with this instant's reading, once and only once."""
         old, time = context.get_discrete_state_vector().value(), context.get_time()
         if time - old[_MOVING] < self._half and old[_MOVING] >= 0.0:
             return old.copy()
-        own = self._context.Eval(context)
+        plant, own, sleeve = self._plant, self._own, self._abdomen.sleeve
+        plant.SetPositionsAndVelocities(own, self._state.Eval(context))
         V_WM = self._body.EvalSpatialVelocityInWorld(own).get_coeffs()
-        v_WC = self._abdomen.sleeve.EvalSpatialVelocityInWorld(own).translational()
-        L = self._plant.CalcSpatialMomentumInWorldAboutPoint(own, self._below, _STILL)
+        v_WC = sleeve.EvalSpatialVelocityInWorld(own).translational()
+        L = plant.CalcSpatialMomentumInWorldAboutPoint(own, self._below, _STILL)
         moving = np.concatenate([L.get_coeffs(), V_WM, v_WC])
         rate = np.zeros(_MOVING)
         if old[_MOVING] >= 0.0:
             rate = (moving - old[:_MOVING]) / (time - old[_MOVING])
-        m, f = rate[:3], rate[3:_MOMENTUM]
-        for p, torque, force in self._loads(context, own):
-            f = f - force
-            m = m - torque - np.cross(p, force)
-        X_WM = self._body.EvalPoseInWorld(own)
-        R_MW = X_WM.rotation().matrix().T
-        m = m - np.cross(X_WM.translation(), f)
-        felt = [R_MW @ f, R_MW @ m, rate[6:]]  # as `Felt` has them
-        return np.concatenate([moving, [time], *felt])
-
-    def _loads(self, context: Any, own: Any) -> list[tuple[Any, Any, Any]]:
-        """Place, torque and force in W of all that acts on the bodies below."""
-        bushing, sleeve = self._abdomen.bushing, self._abdomen.sleeve
-        K = self._abdomen.params.stiffness * self._factor(context.get_time())
-        bushing.SetForceStiffnessConstants(own, [K] * 3)
-        X_WC = sleeve.EvalPoseInWorld(own)
-        F_C = bushing.CalcBushingSpatialForceOnFrameC(own)
-        R_WC = X_WC.rotation()
-        centre = self._plant.CalcCenterOfMassPositionInWorld(own, self._heavy)
-        loads = [
-            (centre, np.zeros(3), self._weight),
-            (
-                X_WC.translation(),
-                R_WC.multiply(F_C.rotational()),
-                R_WC.multiply(F_C.translational()),
-            ),
-        ]
+        K = self._abdomen.params.stiffness * self._factor(time)
+        self._abdomen.bushing.SetForceStiffnessConstants(own, [K] * 3)
+        F_C = self._abdomen.bushing.CalcBushingSpatialForceOnFrameC(own).get_coeffs()
+        X_WC, X_WM = sleeve.EvalPoseInWorld(own), self._body.EvalPoseInWorld(own)
+        centre = plant.CalcCenterOfMassPositionInWorld(own, self._heavy)
+        load = np.zeros(6)  # moment about the world's origin, and force
         if self._applied.HasValue(context):
-            for one in self._applied.Eval(context):
-                if int(one.body_index) in self._bodies:
-                    body = self._plant.get_body(one.body_index)
-                    p = body.EvalPoseInWorld(own).multiply(one.p_BoBq_B)
-                    F = one.F_Bq_W
-                    loads.append((p, F.rotational(), F.translational()))
-        return loads
+            load = self._applied_load(context)
+        felt = balance(
+            rate,
+            load,
+            centre,
+            self._weight,
+            X_WC.translation(),
+            X_WC.rotation().matrix() @ F_C.reshape(2, 3).T,
+            X_WM.translation(),
+            X_WM.rotation().matrix(),
+        )
+        return np.concatenate([moving, [time], felt])
+
+    def _applied_load(self, context: Any) -> np.ndarray:
+        """Moment about the world's origin and force of all that is applied, (6,)."""
+        load = np.zeros(6)
+        for one in self._applied.Eval(context):
+            if int(one.body_index) in self._bodies:
+                body = self._plant.get_body(one.body_index)
+                p = body.EvalPoseInWorld(self._own).multiply(one.p_BoBq_B)
+                load += one.F_Bq_W.Shift(-p).get_coeffs()
+        return load
 
     def _calc_felt(self, context: Any) -> np.ndarray:
         felt: np.ndarray = self._next.Eval(context)[_MOVING + 1 :]

@@ -2,13 +2,23 @@
 
 from dataclasses import dataclass, field
 import hashlib
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.common.archive import read_archive, write_archive
+from plants.tissue.space import SOLID
+from systems.common.archive import (
+    check_arrays,
+    read_archive,
+    sensible,
+    write_archive,
+)
+
+FORMAT = 1
+"""Of an execution's file."""
 
 
 @dataclass
@@ -52,28 +62,57 @@ def save_execution(path: Path, done: Execution, postures: NDArray) -> None:
     meta: dict[str, Any] = {
         name: value for name, value in vars(done).items() if name != "tau"
     }
+    meta["format"] = FORMAT
     meta["plan"] = _digest(postures[: done.posture + 1])
     write_archive(path, meta, {"tau": done.tau})
 
 
-def load_execution(path: Path, postures: NDArray) -> Execution:
+def load_execution(path: Path, postures: NDArray, shape: tuple[int, ...]) -> Execution:
     """What has been done of a plan; nothing if there is no file.
 
     Args:
         path: The file.
         postures: Of the plan, (n, 7). It may have grown since.
+        shape: Of the tissue's voxels.
 
     Raises:
-        ValueError: If the file is damaged, or of another plan.
+        ValueError: If the file is damaged, makes no sense, or is of another plan.
     """
     if not path.is_file():
         return Execution()
-    meta, arrays = read_archive(path, "execution")
-    plan, posture = meta.pop("plan"), meta["posture"]
+    meta, arrays = read_archive(path, "execution", FORMAT)
+    with sensible(path, "execution"):
+        plan, posture = meta.pop("plan"), meta["posture"]
+        done = _restored(meta, arrays, len(postures), shape)
     if plan != _digest(postures[: posture + 1]):
         raise ValueError(
             f"execution {str(path)!r} is of another plan: move it away to carry this "
             "plan out from its beginning"
         )
-    removed, touched = tuple(meta.pop("removed")), tuple(meta.pop("touched"))
-    return Execution(**meta, removed=removed, touched=touched, tau=arrays["tau"])
+    return done
+
+
+def _restored(
+    meta: dict[str, Any], arrays: dict[str, Any], visits: int, shape: tuple[int, ...]
+) -> Execution:
+    removed, touched = map(float, meta["removed"]), map(float, meta["touched"])
+    done = Execution(
+        int(meta["posture"]),
+        float(meta["time"]),
+        int(meta["index"]),
+        (next(removed), next(removed)),
+        (next(touched), next(touched)),
+        float(meta["way"]),
+        arrays["tau"],
+        [int(move) for move in meta.get("bored", [])],
+    )
+    check_arrays(arrays, {"tau": ("i4", shape)})
+    numbers = (done.time, done.way, done.index, done.posture, *done.removed)
+    if not all(0 <= number < math.inf for number in numbers):
+        raise ValueError("a time, a way or an amount below zero")
+    if not done.posture < visits or not done.index < SOLID:
+        raise ValueError(f"posture {done.posture} of {visits}")
+    tau = arrays["tau"]
+    if not ((tau == SOLID) | (tau >= 0) & (tau <= done.index)).all():
+        raise ValueError("an arrival at no move")
+    return done

@@ -17,10 +17,41 @@ from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import Posture, ToolPose
 from systems.common.block import Block
-from systems.common.signal import flat, vector
+from systems.common.compiled import compiled
+from systems.common.signal import size, view
 from systems.common.signals import MovingPoint
 
 Floats = np.ndarray
+
+
+@compiled
+def in_organ(
+    x: Floats,
+    h: float,
+    offset: float,
+    R_WM: Floats,
+    p_WM: Floats,
+    channel: float,
+    R_WE: Floats,
+    p_WE: Floats,
+) -> Floats:
+    """Tool, its axis and the intermediate axis in E, (9,), of a posture x in C."""
+    c = np.empty((POINTS, 3))
+    corners(x, h, offset, c)
+    n, n_I = link_axis(c, 5, h), link_axis(c, 3, h)
+    out = np.zeros(9)
+    for i in range(3):
+        for j in range(3):
+            place = p_WM[j] + channel * R_WM[j, 2] - p_WE[j]
+            axis = other = 0.0
+            for k in range(3):
+                place += R_WM[j, k] * c[POINTS - 1, k]
+                axis += R_WM[j, k] * n[k]
+                other += R_WM[j, k] * n_I[k]
+            out[i] += R_WE[j, i] * place
+            out[3 + i] += R_WE[j, i] * axis
+            out[6 + i] += R_WE[j, i] * other
+    return out
 
 
 class SnakeInOrgan(Block):
@@ -74,25 +105,29 @@ class SnakeInOrgan(Block):
 
     def _calc_target(self, context: Any) -> Floats:
         """Tool, its axis and the intermediate axis in E, (9,)."""
-        x = self._posture.Eval(context)
-        c, h = np.empty((POINTS, 3)), self._snake.half_pitch
-        corners(x, h, self._snake.tool_offset, c)
         X_WM = self._poses.Eval(context)[self._body]
-        R_WM = X_WM.rotation().matrix()
-        p_WC = X_WM.translation() + self._channel * R_WM[:, 2]
-        R_EC = self._R_WE.T @ R_WM
-        p = self._R_WE.T @ (p_WC - self._entry.Eval(context)[:3]) + R_EC @ c[-1]
-        axes = [R_EC @ np.array(link_axis(c, i, h)) for i in (5, 3)]
-        return np.concatenate([p, *axes])
+        entry = view(MovingPoint, self._entry.Eval(context)).p.copy()
+        target: Floats = in_organ(
+            self._posture.Eval(context),
+            self._snake.half_pitch,
+            self._snake.tool_offset,
+            X_WM.rotation().matrix(),
+            X_WM.translation(),
+            self._channel,
+            self._R_WE,
+            entry,
+        )
+        return target
 
     def _calc_posture(self, context: Any) -> Floats:
         target = self._target.Eval(context)
-        x, status = tool_posture(target, self._snake)
-        if status == REACHED:
-            return np.array(x)
-        # Far outside the organ: straight, the tool at its depth.
+        if target[2] > -self._snake.tool_radius:
+            x, status = tool_posture(target, self._snake)
+            if status == REACHED:
+                return np.array(x)
+        # Before the organ nothing is touched: straight, the tool at its depth.
         return np.array([target[2] - self._length, *np.zeros(6)])
 
     def _calc_tool(self, context: Any) -> Floats:
-        target = self._target.Eval(context)
-        return flat(ToolPose(vector(target[:3]), vector(target[3:6])))
+        tool: Floats = self._target.Eval(context)[: size(ToolPose)]
+        return tool

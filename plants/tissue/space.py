@@ -183,13 +183,30 @@ def row_span(s: Space, u: Vector, left: float, a: int, b: int) -> tuple[int, int
 
 
 @compiled
+def between_channels(s: Space, p: Numbers, rho: float) -> bool:
+    """Whether what of a ball lies beyond the grid lies in channels together."""
+    if len(s.channels) < 2:
+        return False
+    for a in range(-1, 2):
+        for b in range(-1, 2):
+            for c in range(-1, 2):
+                far = math.sqrt(a * a + b * b + c * c)
+                if far == 0.0:
+                    continue
+                q = along(p, rho / far, (float(a), float(b), float(c)))
+                if voxel_of(s, q) == OUTSIDE and not in_channel(s, q, 0.0):
+                    return False
+    return True
+
+
+@compiled
 def first_solid(s: Space, p: Numbers, rho: float) -> int:
     """The first voxel that a ball would meet: its flat index, FREE or OUTSIDE."""
     if in_channel(s, p, rho):
         return FREE
     u = in_voxels(s, p)
     r = rho / s.spacing
-    if not on_grid(s, u, (r, r, r)):
+    if not on_grid(s, u, (r, r, r)) and not between_channels(s, p, rho):
         return OUTSIDE
     below, above = span(u[2], r, s.size[2])
     for a in range(*span(u[0], r, s.size[0])):

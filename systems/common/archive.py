@@ -4,7 +4,7 @@ Each carries a digest of its content, so a damaged one is recognised, and the fi
 that it replaces is kept beside it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 import errno
 import hashlib
@@ -18,6 +18,10 @@ from typing import Any
 import numpy as np
 
 MAGIC = b"trocar-archive-1"
+
+type Arrays = Mapping[str, tuple[str, tuple[int | str, ...]]]
+"""Of each array its kind, as numpy's `dtype.str` ends, and its lengths; a length that
+is a name is the same wherever the name stands."""
 
 
 def before(path: Path) -> Path:
@@ -83,15 +87,53 @@ def write_archive(path: Path, meta: dict[str, Any], arrays: dict[str, Any]) -> N
             os.replace(path, before(path))
 
 
-def read_archive(path: Path, what: str) -> tuple[dict[str, Any], dict[str, Any]]:
+@contextmanager
+def sensible(path: Path, what: str) -> Iterator[None]:
+    """What does not fit in this context is refused as the file's nonsense.
+
+    Raises:
+        ValueError: The file is named.
+    """
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
+        told = f"no {error}" if isinstance(error, KeyError) else str(error)
+        raise ValueError(f"{what} {str(path)!r} makes no sense: {told}") from error
+
+
+def check_arrays(arrays: Mapping[str, Any], expected: Arrays) -> None:
+    """Holds arrays against what they should be; all numbers must be finite.
+
+    Raises:
+        ValueError: For the first that is not so.
+    """
+    lengths: dict[str, int] = {}
+    for name, (kind, shape) in expected.items():
+        array = arrays[name]
+        told = f"{name} is {array.dtype.str[1:]} {array.shape}"
+        wanted = tuple(
+            lengths.setdefault(length, found) if isinstance(length, str) else length
+            for length, found in zip(shape, array.shape, strict=False)
+        )
+        if array.dtype.str[1:] != kind or array.shape != wanted:
+            raise ValueError(f"{told}, expected {kind} {wanted}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"{name} holds numbers that are not finite")
+
+
+def read_archive(
+    path: Path, what: str, version: int
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """Plain data and arrays of a file.
 
     Args:
         path: The file.
         what: What it is, for messages.
+        version: Its `format`.
 
     Raises:
-        ValueError: If it is not there or damaged; a whole one before it is offered.
+        ValueError: If it is not there or damaged, and a whole one before it is
+            offered; or if it is of another version.
     """
     earlier, offer = before(path), ""
     if earlier.is_file() and _content(earlier) is not None:
@@ -103,7 +145,14 @@ def read_archive(path: Path, what: str) -> tuple[dict[str, Any], dict[str, Any]]
         raise ValueError(f"{what} {str(path)!r} is damaged{offer}")
     with np.load(io.BytesIO(content), allow_pickle=False) as data:
         arrays = {name: data[name] for name in data.files}
-    return json.loads(str(arrays.pop("meta"))), arrays
+    meta = json.loads(str(arrays.pop("meta")))
+    found = meta.get("format")
+    if found != version:
+        raise ValueError(
+            f"{what} {str(path)!r} has format {found}, expected {version}: it was made "
+            "by another version; make it anew"
+        )
+    return meta, arrays
 
 
 def _content(path: Path) -> bytes | None:

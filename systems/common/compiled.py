@@ -7,7 +7,7 @@ twice what a tight loop of it does. A compiled function costs one call.
 A compiled function is the function; there is no second version in Python. It takes
 arrays straight from `port.Eval`, floats, tuples of floats (3-vectors are tuples, which
 stay in registers) and a block's parameters as `packed` has them. It is compiled at
-its first call for the types it gets and cached on disk.
+its first call for the types it gets and cached on disk, where that can be written to.
 """
 
 import ast
@@ -41,8 +41,13 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     before = numba.config.CACHE_LOCATOR_CLASSES
     numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.InTree,{__name__}.UserWide"
     filed = Path(function.__code__.co_filename).is_file()  # not in a notebook
+    compile_: Any = numba.njit(error_model="numpy")
+    result = compile_(function)
     try:
-        result: Any = numba.njit(cache=filed, error_model="numpy")(function)
+        if filed:
+            result.enable_caching()
+    except RuntimeError:  # no place can be written to: each process compiles anew
+        result = compile_(function)
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = before
     return result

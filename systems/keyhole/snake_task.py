@@ -17,23 +17,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check, parameter
-from systems.common.signal import flat, view
+from systems.common.signal import flat, reader, size, view
 from systems.keyhole.phases import Phases
 from systems.keyhole.signals import Phase, SnakeStatus, TubePose
 from systems.resection.wires.procedure_player import (
     ProcedurePlayerParams,
     posture_at,
     schedule,
-    target_of,
 )
 from systems.sensing.organ_estimator import OrganMotion
 
 Floats = np.ndarray
+_ALONG = (0.0, 0.0, 1.0)
+read_tube = reader(TubePose)
 
 
 @dataclass
@@ -48,6 +50,9 @@ class SnakeTaskParams:
     )
     bend_rate: float = parameter(
         0.4, "on the way to the plan's beginning", "rad/s", above=0.0, most=5.0
+    )
+    follow: bool = parameter(
+        True, "whether it makes up for tube and organ; else C is taken for E"
     )
     retreat: float = parameter(
         0.15, "time in which the tool draws back", "s", above=0.0, most=5.0
@@ -89,15 +94,44 @@ def frame(x: Floats, z: Floats) -> Floats:
     return R
 
 
+@compiled
 def in_channel(
-    target: ToolTarget, R_WE: Floats, p_WE: Floats, tube: TubePose, gap: float
+    target: Floats, R_WE: Floats, p_WE: Floats, tube: Floats, gap: float
 ) -> Floats:
-    """A target given in E as the elements of one in C, the entry being at p_WE."""
-    R_WC = frame(np.array(tube.x), np.array(tube.z))
-    p_WC = tube.p + gap * R_WC[:, 2]
-    R_CE = R_WC.T @ R_WE
-    p = R_WC.T @ (p_WE - p_WC) + R_CE @ target.p
-    return np.concatenate([p, R_CE @ target.n, R_CE @ target.n_I])
+    """A target given in E in C, both as elements.
+
+    Args:
+        target: Of a `ToolTarget`.
+        R_WE: Orientation of E.
+        p_WE: The entry.
+        tube: Of a `TubePose`.
+        gap: From the tube's end to C.
+    """
+    at = read_tube(tube)
+    R_WC = frame(np.array(at.x), np.array(at.z))
+    away = p_WE - np.array(at.p) - gap * R_WC[:, 2]
+    out = np.zeros(9)
+    for i in range(3):
+        for k in range(3):
+            out[i] += R_WC[k, i] * away[k]
+            turn = 0.0
+            for j in range(3):
+                turn += R_WC[j, i] * R_WE[j, k]
+            for part in range(3):
+                out[3 * part + i] += turn * target[3 * part + k]
+    return out
+
+
+@compiled
+def target_elements(x: Floats, h: float, offset: float) -> Floats:
+    """The elements of the `ToolTarget` of a posture x (7,)."""
+    c = np.empty((POINTS, 3))
+    corners(x, h, offset, c)
+    n, n_I = link_axis(c, 5, h), link_axis(c, 3, h)
+    out = np.empty(9)
+    for i in range(3):
+        out[i], out[3 + i], out[6 + i] = c[POINTS - 1, i], n[i], n_I[i]
+    return out
 
 
 @dataclass
@@ -201,9 +235,7 @@ class SnakeTask(Block):
         self._tube = self.signal_in("tube", TubePose)
         self._organ = self.signal_in("organ", OrganMotion)
         self.DeclareDiscreteState(flat(Way(0.0, 0.0, 0.0)))
-        held = flat(
-            ToolTarget((0.0, 0.0, self._inside + length), *((0.0, 0.0, 1.0),) * 2)
-        )
+        held = np.array([0.0, 0.0, self._inside + length, *_ALONG, *_ALONG])
         self._held = self.DeclareDiscreteState(held)
         state, phase = {self.xd_ticket()}, {self._phase.ticket()}
         reads = state | phase | {self._tube.ticket(), self._organ.ticket()}
@@ -253,7 +285,7 @@ class SnakeTask(Block):
                 clock = max(clock - p.rewind * dt, 0.0)
             else:
                 way = max(way - dt, 0.0)
-        return flat(Way(way, clock, retreat))
+        return np.array([way, clock, retreat])
 
     def _posture(self, now: Way) -> Floats:
         """The posture in E from the third leg on."""
@@ -278,18 +310,26 @@ class SnakeTask(Block):
         now = Way(*self._next.Eval(context).tolist())
         out, over = self._ends[:2]
         z = self._inside + self._p.speed * min(now.way, out) + self._length
-        in_tube = flat(ToolTarget((0.0, 0.0, z), *((0.0, 0.0, 1.0),) * 2))
+        in_tube = np.array([0.0, 0.0, z, *_ALONG, *_ALONG])
         if now.way <= out:
             return in_tube
-        target = target_of(self._posture(now), self._snake)
-        p_WE, at = view(OrganMotion, organ).p, view(TubePose, tube)
-        told = in_channel(target, self._R_WE, p_WE, at, self._gap)
+        p_WE = view(OrganMotion, organ).p.copy()
+        R_WE = self._R_WE
+        if not self._p.follow:
+            at = view(TubePose, tube)
+            p_WE, R_WE = at.p + self._gap * at.z, frame(R_WE[:, 0].copy(), at.z.copy())
+        told = in_channel(self._tool(now), R_WE, p_WE, tube.copy(), self._gap)
         share = smooth((now.way - out) / (over - out))
         return in_tube + share * (told - in_tube)
 
     def _calc_reference(self, context: Any) -> Floats:
-        target = target_of(self._posture(self._way(context)), self._snake)
-        return flat(ToolPose(target.p, target.n))
+        return self._tool(self._way(context))[: size(ToolPose)]
+
+    def _tool(self, now: Way) -> Floats:
+        """The elements of the `ToolTarget` in E, from the third leg on."""
+        snake, x = self._snake, self._posture(now)
+        tool: Floats = target_elements(x, snake.half_pitch, snake.tool_offset)
+        return tool
 
     def _calc_status(self, context: Any) -> Floats:
         now = self._way(context)
@@ -304,13 +344,13 @@ class SnakeTask(Block):
                 rate = -rate
             elif code != Phases.RESECT:
                 rate = 0.0
-        return flat(
-            SnakeStatus(
+        return np.array(
+            [
                 now.way / float(self._ends[-1]),
                 self._advance * smooth(share),
                 rate,
                 now.clock,
                 min(self._plan.end - now.clock, 1e6),
                 now.retreat,
-            )
+            ]
         )

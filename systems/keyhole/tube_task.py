@@ -20,9 +20,9 @@ from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
 from systems.sensing.organ_estimator import OrganMotion
 
 finite_organ, finite_phase = finiteness(OrganMotion), finiteness(Phase)
-finite_snake = finiteness(SnakeStatus)
+finite_snake, finite_tool = finiteness(SnakeStatus), finiteness(ToolMotion)
 _STILL = (0.0, 0.0, 0.0)
-_PROBE = float(Phases.PROBE)
+_PROBE, _APPROACH = float(Phases.PROBE), float(Phases.APPROACH)
 
 
 @dataclass
@@ -35,6 +35,9 @@ class TubeTaskParams:
     speed: float = parameter(
         0.03, "mean, on the way to the station", "m/s", above=0.0, most=0.2
     )
+    handing: float = parameter(
+        1.5, "least time of that way, and from a planner's", "s", above=0.0, most=20.0
+    )
     follow: bool = parameter(
         True, "whether the arm follows the organ; else it keeps to the mean place"
     )
@@ -45,6 +48,7 @@ class Way(NamedTuple):
     """How far the tube is on its way: a share, its start, and what was commanded."""
 
     share: float
+    first: Vector
     p: Vector
     v: Vector
     u: Vector
@@ -58,10 +62,11 @@ def _task(
     phase: Phase,
     organ: OrganMotion,
     snake: SnakeStatus,
+    planned: ToolMotion,
 ) -> tuple[Way, ToolMotion, TubeStatus]:
     told = finite_phase(phase) and finite_organ(organ) and finite_snake(snake)
-    if not told:  # stands still
-        held = Way(way.share, way.p, _STILL, way.u)
+    if not (told and finite_tool(planned)):  # stands still
+        held = Way(way.share, way.first, way.p, _STILL, way.u)
         return (
             held,
             ToolMotion(way.p, way.u, _STILL, _STILL, time),
@@ -73,23 +78,26 @@ def _task(
         p_WE, v_WE = (c.entry[0], c.entry[1], c.entry[2]), _STILL
     station = along(p_WE, snake.advance - c.standoff, z)
     speed = along(v_WE, snake.rate, z)
-    share = way.share
-    first = (c.first[0], c.first[1], c.first[2])
-    length = max(norm(sub(station, first)), 1e-6)
+    share, first = way.share, way.first
+    by_plan = planned.time >= 0.0 and phase.code == _APPROACH
+    if by_plan:
+        first = along(planned.tip, time - planned.time, planned.v)
     rate = 0.0
-    if phase.code != _PROBE and share < 1.0:
-        rate = phase.pace * c.speed / length
+    if phase.code != _PROBE and not by_plan and share < 1.0:
+        length = norm(sub(station, first))
+        rate = phase.pace * min(c.speed / max(length, 1e-6), 1.0 / c.handing)
         share = min(1.0, share + rate * c.period)
     g = share**3 * (10.0 + share * (6.0 * share - 15.0))
     slope = 30.0 * share**2 * (1.0 - share) ** 2 * rate
     p = along(first, g, sub(station, first))
     v = along(scaled(slope, sub(station, first)), g, speed)
+    if by_plan:
+        v = planned.v
     away = norm(sub(p, station))
     relative = norm(sub(v, speed))
-    du = _STILL
     return (
-        Way(share, p, v, way.u),
-        ToolMotion(p, way.u, v, du, time),
+        Way(share, first, p, v, way.u),
+        ToolMotion(p, way.u, v, _STILL, time),
         TubeStatus(away, relative),
     )
 
@@ -102,6 +110,9 @@ class TubeTask(StepBlock):
     Port ``organ`` accepts the entry's `OrganMotion`.
 
     Port ``snake`` accepts the `SnakeStatus`: with it the tube advances to its work.
+
+    Port ``planned`` accepts a planner's `ToolMotion`, that leads through the approach;
+    without a wire the way is straight.
 
     Port ``tool`` emits the `ToolMotion` that the passive wrist takes; its u is none.
 
@@ -133,8 +144,10 @@ class TubeTask(StepBlock):
                 "phase": Phase,
                 "organ": OrganMotion,
                 "snake": SnakeStatus,
+                "planned": ToolMotion,
             },
-            Way(0.0, p, _STILL, u),
+            Way(0.0, p, p, _STILL, u),
             {"tool": ToolMotion, "status": TubeStatus},
             params.period,
+            defaults={"planned": ToolMotion(p, u, _STILL, _STILL, -1.0)},
         )

@@ -21,24 +21,38 @@ from plants.arm.signals import ArmState, Posture
 from plants.instruments.instrument import InstrumentParams
 from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import Vector, along, cross, sub
+from systems.common.geometry import (
+    Vector,
+    all_finite,
+    along,
+    cross,
+    norm,
+    plus,
+    scaled,
+    sub,
+    xyz,
+)
 from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tool_state
-from systems.common.signal import Field, finiteness, flat, reader, size
-from systems.common.signals import ToolMotion
+from systems.common.signal import Field, finiteness, flat, reader, size, view
+from systems.common.signals import FREE, Permission, Point, ToolMotion
 from systems.common.step_block import wired
+from systems.common.stops import Stop
 
 
 class Status(NamedTuple):
     """Whether the arm follows."""
 
     code: Annotated[
-        float, Field("1", "1 while joint limits keep it from following, else 0", 0.0)
+        float,
+        Field("1", "1 while joint limits keep it from following, 2 while limp", 0.0),
     ]
 
 
-read_tool = reader(ToolMotion)
-finite_motion = finiteness(ToolMotion)
+LIMP = 2.0
+"""Status of an arm that gives way: its servos are told where it is."""
+read_tool, read_point = reader(ToolMotion), reader(Point)
+finite_motion, finite_state = finiteness(ToolMotion), finiteness(ArmState)
 
 
 @dataclass
@@ -58,12 +72,34 @@ class JointCommandsParams:
     joint_margin: float = parameter(
         0.03, "distance kept from the joints' end stops", "rad", least=0, most=0.5
     )
+    # Where not all can be had: a tip that lags costs time, a fulcrum missed force.
+    fulcrum_first: float = parameter(
+        5.0, "weight of the fulcrum's motion against the turning", least=1, most=1e3
+    )
     shortfall: float = parameter(
         0.005, "error of the tool's velocity that is told", "m/s", least=0, most=0.05
+    )
+    catch_up: float = parameter(
+        0.1,
+        "speed at the most with which an error is made good",
+        "m/s",
+        above=0,
+        most=1,
+    )
+    # At the fulcrum; 2 mm are 1 N on a usual wall. A sound arm strays 0.3 mm.
+    follow: float = parameter(
+        2e-3, "how far the arm may stray from its command", "m", above=0, most=0.05
+    )
+    limp_time: float = parameter(
+        0.3, "that an arm which strayed stays limp", "s", least=0, most=10
     )
 
 
 _BOUNDS = np.hstack([np.eye(7), -np.eye(7)])
+_STILL = (0.0, 0.0, 0.0)
+_FREE = flat(FREE)
+_YIELD = 0.7
+_GIVE_WAY = (float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST))
 _LITTLE = 1e-6
 """Weight of the centering against the tool's motion: the arm's spare joint alone."""
 
@@ -147,6 +183,7 @@ def tool_twist(
     now: float,
     period: float,
     gain: float,
+    fastest: float,
 ) -> tuple[Vector, Vector]:
     """The tip's spatial velocity that carries the tool along its command.
 
@@ -157,6 +194,8 @@ def tool_twist(
         now: Time [s] of p_WT and u_WT.
         period: How long the velocity will hold [s].
         gain: Share of the remaining error taken away in it.
+        fastest: Speed at the most with which that is done [m/s], the shaft ten times
+            as fast in rad/s.
 
     Returns:
         Angular and translational velocity (w, v) in W [rad/s, m/s]; there is no
@@ -166,32 +205,55 @@ def tool_twist(
     rate = gain / period
     p = along(tool.tip, ahead, tool.v)
     u = along(tool.u, ahead, tool.du)
-    v = along(tool.v, rate, sub(p, p_WT))
-    return cross(u, along(tool.du, rate, sub(u, u_WT))), v
+    away, askew = sub(p, p_WT), sub(u, u_WT)
+    worst = rate * max(norm(away), 0.1 * norm(askew))
+    # Both by one share: so the shaft keeps to the fulcrum on the way.
+    share = 1.0 if worst <= fastest else fastest / worst
+    v = scaled(share, along(tool.v, rate, away))
+    return cross(u, scaled(share, along(tool.du, rate, askew))), v
 
 
 @compiled
 def problem(
-    constants: Any, arm: Any, q: np.ndarray, tool: ToolMotion, time: float
+    constants: Any,
+    arm: Any,
+    q: np.ndarray,
+    time: float,
+    tool: ToolMotion,
+    fulcrum: Point,
 ) -> tuple[np.ndarray, ...]:
     """The quadratic program of an instant, as `joint_velocity` takes it.
+
+    The tool's velocity is asked at the fulcrum, where an error costs force, and
+    weighs more there than its turning: where both cannot be had, the tip lags.
 
     Args:
         constants: A record of `JointCommands`.
         arm: A record of `read_arm`.
         q: Commanded joint positions (7) [rad].
-        tool: The command.
         time: Now [s].
+        tool: The command.
+        fulcrum: The shaft's; the tip stands for it if it is no number.
 
     Returns:
         J, V, v_nominal, low, high; and the torques of the load's weight (7) [Nm].
     """
     period = constants.period
     p_WT, u_WT, J, weight = tool_state(arm, q)
-    w, v = tool_twist(p_WT, u_WT, tool, time, period, constants.gain)
+    twist = (p_WT, u_WT, tool, time, period, constants.gain, constants.catch_up)
+    w, v = tool_twist(*twist)
+    lever = _STILL
+    if all_finite(fulcrum.p):
+        lever = sub(fulcrum.p, p_WT)
+    V = np.array(w + plus(v, cross(w, lever)))
+    for i in range(JOINTS):
+        dv = cross(xyz(J[:3, i], 0), lever)
+        for k in range(3):
+            J[3 + k, i] = constants.fulcrum_first * (J[3 + k, i] + dv[k])
+    V[3:] *= constants.fulcrum_first
     return (
         J,
-        np.array(w + v),
+        V,
         constants.centering * (constants.nominal - q),
         np.maximum(-constants.speed, (constants.low - q) / period),
         np.minimum(constants.speed, (constants.high - q) / period),
@@ -201,9 +263,22 @@ def problem(
 
 @compiled
 def _problem(
-    record: np.ndarray, arm: np.ndarray, q: np.ndarray, tool: np.ndarray, time: float
+    record: np.ndarray,
+    arm: np.ndarray,
+    q: np.ndarray,
+    time: float,
+    tool: np.ndarray,
+    fulcrum: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
-    return problem(record[0], arm[0], q, read_tool(tool), time)
+    told = read_tool(tool), read_point(fulcrum)
+    return problem(record[0], arm[0], q, time, told[0], told[1])
+
+
+@compiled
+def missing(constants: Any, J: np.ndarray, v: np.ndarray, V: np.ndarray) -> float:
+    """How much of the tool's velocity is missing [m/s, rad/s], see `problem`."""
+    short = np.abs(product(J, v) - V)
+    return max(short[:3].max(), short[3:].max() / constants.fulcrum_first)
 
 
 @compiled
@@ -232,33 +307,68 @@ def command(
 
 @compiled
 def _free_step(
-    constants: Any, arm: Any, q: np.ndarray, time: float, tool: ToolMotion
-) -> tuple[np.ndarray, np.ndarray, Status, float]:
-    """What `command` gives, and 1 if the free minimum keeps the bounds, else 0."""
+    constants: Any,
+    arm: Any,
+    q: np.ndarray,
+    rest: np.ndarray,
+    time: float,
+    tool: ToolMotion,
+    fulcrum: Point,
+    measured: ArmState,
+    permission: Permission,
+) -> tuple[np.ndarray, np.ndarray, Status, float, float]:
+    """What `command` gives, how long the arm stays limp, and whether that is final.
+
+    It is 1 if it is, and 0 if the free minimum does not keep the bounds.
+    """
     if not finite_motion(tool):  # hold still
         weight = tool_state(arm, q)[3]
-        return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (1.0,)
-    J, V, v_nominal, low, high, weight = problem(constants, arm, q, tool, time)
+        return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (0.0, 1.0)
+    J, V, v_nominal, low, high, weight = problem(constants, arm, q, time, tool, fulcrum)
+    q_m, v_m = np.array(measured.q), np.array(measured.v)
+    if not finite_state(measured):  # unseen it is where it was told to be
+        q_m, v_m = q, np.zeros(JOINTS)
+    strayed = np.abs(product(J[3:], q - q_m)).max() / constants.fulcrum_first
+    left = max(rest[0] - constants.period, 0.0)
+    if strayed > constants.follow:
+        left = constants.limp_time
+    if left > 0.0 or permission.code in _GIVE_WAY:
+        _, set_point, _ = command(constants, q_m, np.zeros(JOINTS), weight, 0.0)
+        # Most of the servos' own damping is taken away as well.
+        lag = constants.lead - constants.period
+        set_point[:JOINTS] += _YIELD * lag * v_m
+        return q_m, set_point, Status(LIMP), left, 1.0
     v = free_velocity(J, V, v_nominal)
-    shortfall = np.abs(product(J, v) - V).max()
+    shortfall = missing(constants, J, v, V)
     is_free = 1.0
     for i in range(JOINTS):
         if not low[i] <= v[i] <= high[i]:
             is_free = 0.0
-    return command(constants, q, v, weight, shortfall) + (is_free,)
+    return command(constants, q, v, weight, shortfall) + (0.0, is_free)
 
 
 class JointCommands(Block):
     """Follows the commanded tool pose with the arm's seven joints.
 
     The posture is integrated in the state; its own forward kinematics closes the
-    loop, so nothing drifts. The instrument's weight is fed forward.
+    loop, so nothing drifts. The instrument's weight is fed forward. An arm that does
+    not follow goes limp for a while, and one whose wrist finds the wall loaded, or
+    does not feel it: the servos are told where it is, and the wall moves it.
 
     Port ``tool`` accepts the `ToolMotion`.
+
+    Port ``fulcrum`` accepts G_R, the `Point` that the shaft pivots about; it is the
+    tip if it is not connected.
+
+    Port ``arm_state`` accepts the measured `ArmState`; unconnected it follows.
+
+    Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
 
     Port ``set_point`` emits the `ArmState` that the arm's servos take.
 
     Port ``posture`` emits the commanded `Posture`.
+
+    Port ``next`` emits that of the next instant.
 
     Port ``status`` emits the `Status`.
     """
@@ -288,22 +398,47 @@ class JointCommands(Block):
             compliance=set_point.compliance,
         )
         signals = {"posture": Posture, "set_point": ArmState, "status": Status}
-        sizes = [*map(size, signals.values()), 1]
-        self._step = wired(_free_step, 2, [JOINTS], [ToolMotion], sizes, True)
+        sizes = [*map(size, signals.values()), 1, 1]
+        told = [ToolMotion, Point, ArmState, Permission]
+        self._step = wired(_free_step, 2, [JOINTS, 1], told, sizes, True)
         self._tool = self.signal_in("tool", ToolMotion)
+        self._fulcrum = self.signal_in("fulcrum", Point)
+        self._measured = self.signal_in("arm_state", ArmState)
+        self._permission = self.signal_in("permission", Permission)
         _, _, _, weight = tool_state(self._arm[0], nominal)
         start = command(self._constants[0], nominal, np.zeros(JOINTS), weight, 0.0)
         for (name, signal), state in zip(signals.items(), start, strict=True):
             self.state_out(name, signal, flat(state))
-        self.update_every(params.period, self._update)
+        self.DeclareDiscreteState(1)  # s that it stays limp
+        ports = (self._tool, self._fulcrum, self._measured, self._permission)
+        reads = {self.xd_ticket(), self.time_ticket(), *(p.ticket() for p in ports)}
+        self._next = self.cached("next", self._calc_next, reads)
+        self.signal_out(
+            "next",
+            Posture,
+            lambda context: self._next.Eval(context)[0],
+            {self._next.ticket()},
+        )
+        self.update_every(params.period, self._next.Eval)
 
-    def _update(self, context: Any) -> Sequence[Any]:
+    def _calc_next(self, context: Any) -> Sequence[Any]:
         q = context.get_discrete_state(0).value()
+        rest = context.get_discrete_state(3).value()
         tool, time = self._tool.Eval(context), context.get_time()
-        step = self._step(self._constants, self._arm, q, time, tool)
-        is_free = step[-1]
-        if is_free:
-            return step[:JOINTS], step[JOINTS:-2], step[-2:-1]
-        J, V, *bounds, weight = _problem(self._constants, self._arm, q, tool, time)
+
+        def told(port: Any, instead: np.ndarray) -> np.ndarray:
+            return port.Eval(context) if port.HasValue(context) else instead
+
+        fulcrum = told(self._fulcrum, view(ToolMotion, tool).tip)
+        measured = told(self._measured, np.concatenate([q, q]))
+        permission = told(self._permission, _FREE)
+        constants, arm = self._constants, self._arm
+        step = self._step(
+            constants, arm, q, rest, time, tool, fulcrum, measured, permission
+        )
+        if step[-1]:
+            return step[:JOINTS], step[JOINTS:-3], step[-3:-2], step[-2:-1]
+        J, V, *bounds, weight = _problem(constants, arm, q, time, tool, fulcrum)
         v = joint_velocity(J, V, *bounds)
-        return command(self._constants[0], q, v, weight, abs(J @ v - V).max())
+        short = missing(constants[0], J, v, V)
+        return *command(constants[0], q, v, weight, short), step[-2:-1]

@@ -82,6 +82,9 @@ class FulcrumParams:
     neighbourhood: float = parameter(
         0.08, "the fulcrum is never farther from the guess", "m", above=0, most=0.3
     )
+    steady: bool = parameter(
+        False, "whether it is kept from drifting along the shaft, over minutes"
+    )
     # The estimate is predicted over it.
     latency: float = parameter(
         0.0, "how old force and pose are when they arrive", "s", least=0, most=0.2

@@ -12,10 +12,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import across, along, dot, over, plus, scaled, sub, xyz
+from systems.common.geometry import (
+    across,
+    along,
+    dot,
+    norm,
+    over,
+    plus,
+    scaled,
+    sub,
+    xyz,
+)
 from systems.common.parameter import check
 from systems.common.signal import finiteness, reader, writer
 from systems.common.signals import Fulcrum, ShaftMotion, Wrench
+from systems.passive_wrist import steady as steadying
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.fulcrum_kernels import (
     LN_K,
@@ -31,6 +42,7 @@ from systems.passive_wrist.fulcrum_kernels import (
     update,
     write_entry,
 )
+from systems.passive_wrist.steady import leak, unbiased, unexplained
 
 Floats = np.ndarray
 
@@ -79,8 +91,10 @@ def constants(params: FulcrumParams) -> Floats:
     check(params, "fulcrum_estimator")
     n = 5 + 6 * params.harmonics
     finer = 6 * (HARMONICS - params.harmonics)
-    lengths = (n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS), params.harmonics, finer)
-    names = ("P", "record", "sums", "scalars", "rms", "finer", "end")
+    steady = steadying.SIZE if params.steady else 0
+    lengths = [n, n * n, RECORD * WIDTH, WIDTH, len(SCALARS)]
+    lengths += [params.harmonics, finer, steady]
+    names = ("P", "record", "sums", "scalars", "rms", "finer", "steady_at", "end")
     places = dict(zip(names, np.cumsum(lengths).tolist(), strict=True))
     every = max(1, round(RECORD_PERIOD / params.period))
     return packed(params, n=n, every=float(every), **places)
@@ -98,6 +112,7 @@ class Memory(NamedTuple):
         rms: Of each harmonic, in m.
         finer: a, b (3 each) of the bank's harmonics above the filter's, when it
             last spoke.
+        steady: Of `steady`, if the estimate is kept so.
     """
 
     x: Floats
@@ -107,6 +122,7 @@ class Memory(NamedTuple):
     scalars: Floats
     rms: Floats
     finer: Floats
+    steady: Floats
 
 
 @compiled
@@ -121,7 +137,8 @@ def memory(packed: Floats, z: Floats) -> Memory:
         z[c.sums : c.scalars],
         z[c.scalars : c.rms],
         z[c.rms : c.finer],
-        z[c.finer :],
+        z[c.finer : c.steady_at],
+        z[c.steady_at :],
     )
 
 
@@ -248,7 +265,7 @@ def advance(
     c = packed[0]
     n = c.n
     z = old.copy()
-    x, P, record, sums, aux, rms, _ = memory(packed, z)
+    x, P, record, sums, aux, rms, _, steady = memory(packed, z)
     shaft, wrench = read_shaft(shaft_now), read_wrench(wrench_now)
     parts = c.amplitude_walk * np.maximum(rms, LEAST_RMS)
     aux[TIME], aux[DUE] = time, 0.0
@@ -284,6 +301,14 @@ def advance(
         # angles are heard only while the depth is hardly known at all.
         sigma = spread(P, a.u, 0.0)[1]
         turning *= min(max(sigma / _DEPTH_UNKNOWN - 1.0, 0.0), 1.0)
+    if c.steady and known:
+        tip, v_tip = along(a.p, c.length, a.u), along(a.v, c.length, a.du)
+        rest = unexplained(steady, tip, v_tip, exp(x[LN_OMEGA]), c.period)
+        speed = norm(across(rest, a.u))
+        turning = min(max(speed / c.depth_speed - 1.0, 0.0), 1.0)
+        depth = dot(a.u, sub(xyz(x, 0), a.p))
+        f = unbiased(steady, a, depth, c.period)
+        a = Sample(a.p, a.u, a.v, a.du, f, a.m, a.damping, a.averaged, turning)
     seen = innovate(c, x, P, a)
     if seen.nis < 0.0:
         raise ValueError("fulcrum estimator: a covariance is not positive definite")
@@ -305,8 +330,12 @@ def advance(
         held = 3 if guard else (n if force > least else n - 1)
         # One sample at a time the filter tells a wave from a depth worse than the
         # bank does from the whole record.
-        axial = 0.0 if aux[LED] > 0.0 else max(seen.seen, turning)
-        update(x, P, seen, a.u, axial, held)
+        led = aux[LED] > 0.0
+        told = max(seen.seen, turning)
+        update(x, P, seen, a.u, 0.0 if led else told, held)
+        if c.steady and known:
+            told = 1.0 if led else told
+            leak(steady, x, P, a.u, xyz(c.guess, 0), told, c.period)
     sums += write_entry(entry_of(x, a, turning, seen.w))
     aux[SUMMED] += 1.0
     if aux[SUMMED] >= c.every:
@@ -319,6 +348,8 @@ def advance(
     for k in range(3, n - 2, 6):
         fulcrum = plus(fulcrum, xyz(x, k))
     away = sub(fulcrum, c.guess)
+    if c.steady and known:
+        away = across(away, a.u)
     if dot(away, away) > c.neighbourhood**2:  # refused: starts anew
         aux[REFUSED] += 1.0
         aux[PHASE] = FOLLOWING

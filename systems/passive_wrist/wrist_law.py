@@ -290,7 +290,7 @@ def next_state(
     force = sqrt(max(dot(f, f) - dot(f, u) ** 2, 0.0)) if valid else 0.0
     _watch(s, c, force, valid)
     target, velocity = along(seen.p, c.horizon, seen.v), seen.v
-    if not is_told:
+    if not is_told or (c.code == _PWE and not valid):  # it may have lied before
         target, velocity = xyz(s, PIVOT), _STILL
     elif c.code == _OFF:
         target, velocity = xyz(c.first, 0), _STILL

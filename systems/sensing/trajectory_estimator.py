@@ -119,6 +119,8 @@ class State(NamedTuple):
 
 
 finite_point = finiteness(Point)
+LATEST = 1e-6
+"""A frame's time may be this far ahead, in s: a clock's rounding."""
 
 
 def constants(params: TrajectoryEstimatorParams) -> np.ndarray:
@@ -208,7 +210,10 @@ def predict(params: Any, x: State, t: float) -> Estimate:
         pp, _, _, vv, _, aa = _predict_covariance(params, x, age)
         pp += x.shared + params.var_tremor
         sigma_p, sigma_v, sigma_a = math.sqrt(pp), math.sqrt(vv), math.sqrt(aa)
-    known = age <= params.age_limit and sigma_p <= params.sigma_limit
+    from_future = x.time > t + LATEST  # whatever it says is not of this tool's past
+    known = (
+        not from_future and age <= params.age_limit and sigma_p <= params.sigma_limit
+    )
     yes = 1.0 if known else 0.0
     return Estimate(p, v, a, x.g, sigma_p, sigma_v, sigma_a, yes, age)
 
@@ -217,7 +222,9 @@ def predict(params: Any, x: State, t: float) -> Estimate:
 def _step(
     params: Any, state: State, time: float, measurement: TrackedShaft
 ) -> tuple[State, Estimate]:
-    after = absorb(params, state, measurement)
+    after = state
+    if measurement.time <= time + LATEST:
+        after = absorb(params, state, measurement)
     return after, predict(params, after, time)
 
 
@@ -228,6 +235,7 @@ class TrajectoryEstimator(StepBlock):
     output is a map of state, measurement and time, and the update stores what it
     learned. Latency is made up for by predicting from the frame's time to now. While
     the tool is out of sight the prediction goes on and the standard deviations grow;
+    a frame that is stamped in the future is refused;
     a frame that is late by more than the age limit starts the trajectory anew.
 
     Port ``measurement`` accepts a `TrackedShaft`.

@@ -14,6 +14,7 @@ from plants.turtlebot.turtlebot import RobotState
 from systems.common.parameter import check, parameter
 from systems.switching.fields import (
     attractive_field,
+    printed_attractive_field,
     printed_repulsive_field,
     repulsive_field,
 )
@@ -21,6 +22,7 @@ from systems.switching.navigation_planner import PERIOD, NavigationPlanner, Plan
 from systems.switching.signals import Goal, Mode, PlanarVelocity, Seen
 
 FORMS = ("khatib", "printed")
+ATTRACTIONS = ("gradient", "printed")
 
 
 @dataclass
@@ -33,10 +35,16 @@ class ClassicalParams:
         "square and with the distance to the centre",
         choices=FORMS,
     )
-    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
-    speed: float = parameter(
-        0.5, "greatest, of each part and of the sum", "m/s", above=0.0, most=3.0
+    attraction: str = parameter(
+        "gradient",
+        "its form; printed is the thesis's equation 2 as it stands, a length without "
+        "a direction",
+        choices=ATTRACTIONS,
     )
+    # Khatib's saturation is not in the thesis, and makes zeros of the sum of its own.
+    clipped: bool = parameter(True, "whether the attraction alone is limited to speed")
+    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
+    speed: float = parameter(0.5, "greatest, of the sum", "m/s", above=0.0, most=3.0)
     gain: float = parameter(1.0, "attraction per distance", "1/s", above=0.0, most=20.0)
     repulsion: float = parameter(
         0.01, "eta of Khatib's equation", "m^4/s", above=0.0, most=1.0
@@ -51,13 +59,13 @@ class ClassicalParams:
     )
 
 
-def summed_fields(
+def field_sum(
     params: ClassicalParams,
     place: tuple[float, float],
     goal: tuple[float, float],
     obstacles: Sequence[Seen],
 ) -> tuple[float, float]:
-    """Velocity [m/s]: the anti-gradient of the sum (equation 4), limited.
+    """The anti-gradient of the sum (equation 4) [m/s].
 
     Args:
         params: Parameters.
@@ -66,10 +74,12 @@ def summed_fields(
         obstacles: The obstacles in sight; their velocities do not matter.
     """
     (px, py), (gx, gy) = place, goal
-    fx, fy = attractive_field(px - gx, py - gy)
-    size = params.gain * hypot(fx, fy)
-    scale = params.gain * min(1.0, params.speed / size) if size > 0.0 else 0.0
-    fx, fy = scale * fx, scale * fy
+    printed = params.attraction == "printed"
+    attract = printed_attractive_field if printed else attractive_field
+    fx, fy = attract(px - gx, py - gy)
+    fx, fy = params.gain * fx, params.gain * fy
+    if params.clipped:
+        fx, fy = limited(fx, fy, params.speed)
     is_khatib, body = params.form == "khatib", params.body_radius
     for obstacle in obstacles:
         qx, qy = px - obstacle.x, py - obstacle.y
@@ -79,9 +89,24 @@ def summed_fields(
         else:
             rx, ry = printed_repulsive_field(qx, qy, surface + params.range)
         fx, fy = fx + rx, fy + ry
-    size = hypot(fx, fy)
-    scale = min(1.0, params.speed / size) if size > 0.0 else 0.0
-    return scale * fx, scale * fy
+    return fx, fy
+
+
+def summed_fields(
+    params: ClassicalParams,
+    place: tuple[float, float],
+    goal: tuple[float, float],
+    obstacles: Sequence[Seen],
+) -> tuple[float, float]:
+    """Velocity [m/s]: `field_sum` within the speed."""
+    return limited(*field_sum(params, place, goal, obstacles), params.speed)
+
+
+def limited(x: float, y: float, most: float) -> tuple[float, float]:
+    """A vector no longer than `most`."""
+    size = hypot(x, y)
+    scale = min(1.0, most / size) if size > 0.0 else 0.0
+    return scale * x, scale * y
 
 
 class ClassicalPlanner(NavigationPlanner):

@@ -23,6 +23,12 @@ def attractive_field(qx: float, qy: float) -> Vector:
     return -qx, -qy
 
 
+def printed_attractive_field(qx: float, qy: float) -> Vector:
+    """Equation 2 as printed: a length, which has no direction, for both components."""
+    d = hypot(qx, qy)
+    return d, d
+
+
 def repulsive_potential(rho: float, rho_0: float, gain: float = 1.0) -> float:
     """Khatib's repulsive potential of the distance to an obstacle's surface.
 

@@ -6,6 +6,8 @@ obstacle that comes within two seconds.
 
 from importlib.util import find_spec
 
+import numpy as np
+
 from systems.switching.arcs import Disc, time_to_enter
 from systems.switching.classical_planner import ClassicalParams, summed_fields
 from systems.switching.signals import Seen
@@ -45,6 +47,34 @@ def switching(scene: Scene) -> Step:
     return step
 
 
+def noisy(position: float = 0.05, velocity: float = 0.1) -> Planner:
+    """The switching planner on obstacles seen with noise [m, m/s], white."""
+    generator = np.random.default_rng(7)
+
+    def make(scene: Scene) -> Step:
+        inner = switching(scene)
+
+        def step(
+            x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+        ) -> Command:
+            shown = []
+            for o in seen:
+                a, b, u, v = generator.normal(size=4)
+                shown.append(
+                    o._replace(
+                        x=o.x + position * a,
+                        y=o.y + position * b,
+                        v_x=o.v_x + velocity * u,
+                        v_y=o.v_y + velocity * v,
+                    )
+                )
+            return inner(x, y, theta, vx, vy, shown)
+
+        return step
+
+    return make
+
+
 def _retreats(scene: Scene, x: float, y: float, seen: list[Seen]) -> bool:
     moving = [
         Disc(o.track, x - o.x, y - o.y, o.radius, o.v_x, o.v_y)
@@ -69,7 +99,7 @@ def classical(scene: Scene) -> Step:
 
 
 def statechart(scene: Scene) -> Step:
-    """The thesis's statechart, for obstacles that stand."""
+    """The thesis's statechart as reconstructed, for obstacles that stand."""
     params = StatechartParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
     memory = Manoeuvre()
 
@@ -116,7 +146,6 @@ def orca(scene: Scene) -> Step:
 def hrvo(scene: Scene) -> Step:
     """HRVO as `navground` has it."""
     from navground import core
-    import numpy as np
 
     robot = scene.robot
     behavior = core.Behavior.make_type("HRVO")
@@ -147,7 +176,8 @@ def planners() -> dict[str, Planner]:
     """All planners that can run here, by name."""
     found: dict[str, Planner] = {
         "switching": switching,
-        "statechart": statechart,
+        "switching, noisy": noisy(),
+        "our statechart": statechart,
         "Khatib's sum": classical,
     }
     if find_spec("pyrvo"):

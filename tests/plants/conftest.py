@@ -57,6 +57,18 @@ class Scene:
         context = system.GetMyContextFromRoot(self.simulator.get_context())
         return system.GetOutputPort(port).Eval(context)
 
+    def signed_distances(self) -> list[float]:
+        """Of the robot to obstacle, target and camera, as SceneGraph has them."""
+        graph = self.simulator.get_system().GetSubsystemByName("scene_graph")
+        context = graph.GetMyContextFromRoot(self.simulator.get_context())
+        query = graph.get_query_output_port().Eval(context)
+        return [
+            query.ComputeSignedDistancePairClosestPoints(
+                self.instrument.shaft_geometry, self.tools.shafts[name]
+            ).distance
+            for name in ("obstacle", "target", "camera")
+        ]
+
     def reaction(self) -> Any:
         """What the wrist sensor feels, in the mount frame."""
         port = self.plant.get_reaction_forces_output_port()
@@ -125,15 +137,19 @@ def make_scene() -> Callable[..., Scene]:
         for instance in (abdomen.wall_instance, abdomen.sleeve_instance):
             hold_still(builder, plant, instance)
         tools = add_posed_tools(builder, scene_graph, plant)
+        sources = {}
         for name, fulcrum in zip(tools.shafts, tools.params.fulcrums, strict=True):
             shaft = (tool_shafts or {}).get(
                 name, [fulcrum[0], fulcrum[1], -0.05, *DOWN]
             )
             source = builder.AddNamedSystem(f"tool_{name}", ConstantVectorSource(shaft))
             builder.Connect(source.get_output_port(), tools.GetInputPort(name))
+            sources[name] = source
         clearance = add_clearance(
-            builder, scene_graph, instrument.shaft_geometry, tools.shafts
+            builder, plant, scene_graph, instrument.shaft_geometry, tools
         )
+        for name, source in sources.items():
+            builder.Connect(source.get_output_port(), clearance.GetInputPort(name))
         wall_force = add_wall_force(builder, plant, abdomen)
         servo = SetPoint(period=period)
         controller: Any

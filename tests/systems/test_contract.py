@@ -13,6 +13,7 @@ import pytest
 
 from diagrams.studies import STUDIES, build, load_scenario
 import plants
+from plants.surgeon.guided_tool import GuidedTool
 import systems
 from systems.common.block import Block
 from systems.common.step_block import StepBlock
@@ -33,11 +34,13 @@ def all_blocks(package) -> list[type]:
     return sorted(found, key=lambda kind: kind.__name__)
 
 
-BLOCKS = all_blocks(systems)
+ALONE = [GuidedTool]
+"""Of the plants' floor, but needing none; in a diagram while somebody guides it."""
+BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
-    "pwe_arc": [],
+    "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
     "snake_wire_break": [],
@@ -47,7 +50,7 @@ DIAGRAMS: dict[str, list[str]] = {
 }
 """Scenarios with overrides: every kind of diagram, and every observer in one."""
 # What observes a plant has no ports' values without it: tested in its diagram.
-OBSERVERS = all_blocks(plants)
+OBSERVERS = [kind for kind in all_blocks(plants) if kind not in ALONE]
 
 
 def assert_documented(dut: LeafSystem) -> None:
@@ -180,6 +183,7 @@ COMMANDS = {
     "Endoscope": {"shaft": HELD, "view_cone": HELD},
     "FuzzyArbiter": {"v_R": RATE},
     "GoToTarget": {"v1": RATE},
+    "GuidedTool": {"tip_velocity": RATE},
     "JointCommands": {"posture": HELD, "set_point": HELD},
     "PassiveWristEmulation": {"tool": TOOL},
     "ResectionIk": {"posture": HELD},
@@ -199,22 +203,10 @@ COMMANDS = {
 """Outputs that command a motion, by block: which of their elements are rates, that must
 come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
-    *(
-        "BallLocation",
-        "FulcrumEstimator",
-        "OperationPhases",
-        "OpticalTracker",
-        "OrganEstimator",
-    ),
-    *(
-        "Perception",
-        "RobotLocation",
-        "SnakeLoad",
-        "SnakeLocation",
-        "ToolLoad",
-        "ToolWrench",
-    ),
-    *("TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
+    *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
+    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
+    *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
+    *("BallLocation", "ToolLoad", "WrenchWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}

@@ -7,7 +7,9 @@ hole with a clearance
 
     c' = lambda c + r - r_b,   lambda = (6h + 2l)/(4h + e).
 
-Its fixed point (r_b - r)/(lambda - 1) is unstable: a channel with less clearance
+The plan keeps a clearance between body and tissue and counts on a smaller tool: r_b
+is larger by the one, r smaller by the other. The fixed point (r_b - r)/(lambda - 1)
+is unstable: a channel with less clearance
 makes every hole narrower than the one before, until the robot jams. Voxels are too
 coarse to see it, so it is a check of its own.
 """
@@ -21,13 +23,22 @@ def opening_ratio(params: SnakeParams) -> float:
     return (6 * h + 2 * tool) / (4 * h + e)
 
 
-def least_clearance(params: SnakeParams) -> float:
-    """Clearance in m that the channel must exceed for the entry to open out."""
-    narrow = params.body_radius - params.tool_radius
+def least_clearance(
+    params: SnakeParams, kept: float = 0.0, accuracy: float = 0.0
+) -> float:
+    """Clearance in m that the channel must exceed for the entry to open out.
+
+    Args:
+        params: The robot.
+        kept: Clearance that the plan keeps between body and tissue, in m.
+        accuracy: By which it takes the tool for smaller, in m.
+    """
+    narrow = params.body_radius + kept - (params.tool_radius - accuracy)
     if narrow <= 0.0:
         return 0.0
     ratio = opening_ratio(params)
-    return narrow / (ratio - 1.0) if ratio > 1.0 else float("inf")
+    # The channel is bored for the bare body: what is kept comes on top.
+    return kept + narrow / (ratio - 1.0) if ratio > 1.0 else float("inf")
 
 
 def least_radius(params: SnakeParams, clearance: float = 0.5e-3) -> float:

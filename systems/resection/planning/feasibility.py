@@ -124,12 +124,24 @@ def check_reach(
 
 
 def check_jam(
-    procedure: Procedure, clearance: float, params: SnakeParams
+    procedure: Procedure,
+    clearance: float,
+    params: SnakeParams,
+    kept: float = 0.0,
+    accuracy: float = 0.0,
 ) -> Answer | None:
-    """Refuses an entry that narrows until the robot jams (`entry_law`)."""
+    """Refuses an entry that narrows until the robot jams (`entry_law`).
+
+    Args:
+        procedure: The procedure.
+        clearance: Of the channel, in m.
+        params: The robot with the procedure's tool.
+        kept: Clearance that the plan keeps between body and tissue, in m.
+        accuracy: By which it takes the tool for smaller, in m.
+    """
     if procedure.kind != ENTRY:
         return None
-    needed = least_clearance(params)
+    needed = least_clearance(params, kept, accuracy)
     if needed == 0.0 or clearance > needed:
         return None
     text = (

@@ -24,6 +24,9 @@ from systems.resection.planning.tree import nearest_nodes
 NODES = 2
 """Postures of the tree from which a volume is tried."""
 
+NOBODY = -1
+"""The part that is in the way where a limit is."""
+
 TURNS = (0.6, 0.2)
 """How far, as a share, their axes are turned towards the point."""
 
@@ -97,6 +100,7 @@ def feasibility_map(
         for node, turn in product(found[found >= 0], TURNS):
             if not straightened(body, tree.x[node], p, turn, x):
                 continue
+            why[0] = NOBODY
             gain = try_procedure(
                 s, body, tree, int(node), x, 0.0, pitch, bend, pitch, why
             )
@@ -111,6 +115,8 @@ def feasibility_map(
 
 def _reason(session: Session, part: int) -> str:
     """What the culprit of the last failure is, in a word."""
+    if part == NOBODY:
+        return LIMIT
     at = int(session.why[5])
     label = session.volume.labels.reshape(-1)[at] if at >= 0 else BRAIN
     if label == CRITICAL:

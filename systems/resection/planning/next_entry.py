@@ -194,11 +194,12 @@ def _lines(session: Session, params: EntriesParams) -> list[tuple[str, Matrix, M
     return lines
 
 
-def _gain(session: Session, X_WE: Matrix, seed: int, effort: float) -> float:
-    """Tumour in m3 that an entry would add at least."""
+def _gain(session: Session, X_WE: Matrix | None, seed: int, effort: float) -> float:
+    """Tumour in m3 that can be removed yet, at least, through an entry or as it is."""
     thought = session.thought()
     try:
-        thought.enter_anew(X_WE)
+        if X_WE is not None:
+            thought.enter_anew(X_WE)
     except ValueError:
         return -1.0
     for bend in (PILOT, session.params.max_bend):
@@ -230,19 +231,23 @@ def next_entries(
         return entry.gained - params.price * entry.bored
 
     whole = len(lines) + params.finalists
+    # What a search finds without another entry is no merit of one.
+    control = _gain(session, None, seed, SECOND_LOOK) if lines else 0.0
     for number, (way, through, n) in enumerate(lines):
         progress(number / whole)
         X = channel_along(volume, through, n)
         if X is None:
             continue
-        gained = _gain(session, X, seed, FIRST_LOOK)
         bored = bored_by(volume, X, frames)
+        if bored == 0.0:
+            continue  # it is there
+        gained = _gain(session, X, seed, FIRST_LOOK)
         angle = math.acos(float(np.clip(X[2, 2], -1.0, 1.0)))
         found.append(NextEntry(X, gained, bored, way, angle))
     found.sort(key=worth, reverse=True)
     best = found[: params.finalists]
     for number, entry in enumerate(best):
         progress((len(lines) + number) / whole)
-        entry.gained = _gain(session, entry.X_WE, seed, SECOND_LOOK)
+        entry.gained = _gain(session, entry.X_WE, seed, SECOND_LOOK) - control
     best = [e for e in best if e.gained >= params.least_gain * volume.tumour_volume]
     return sorted(best, key=worth, reverse=True)

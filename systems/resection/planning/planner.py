@@ -59,7 +59,7 @@ class PlannerParams:
 
     # Above 1, since the plan may find more than the search did.
     target: float = parameter(
-        1.005, "share of the reachable part at which it stops", above=0.0, most=1.2
+        1.004, "share of the reachable part at which it stops", above=0.0, most=1.2
     )
     pitch: float = parameter(
         2.0e-3, "of poses when carried out", "m", least=5e-4, most=6e-3
@@ -109,7 +109,7 @@ class PlannerParams:
         1_000_000,
         "strokes that a plan begins at most",
         least=1,
-        most=10_000_000_000,
+        most=100_000_000,
     )
     seed: int = parameter(1, "of all random choices", least=0, most=2**63 - 1)
 
@@ -191,7 +191,8 @@ class Planner:
                 best, least = plan, price
         best.go_home()
         self.session.adopt(best)
-        self.session.concluded = repr(self.params)
+        if self.tried < self.params.budget:  # else there may be more to do
+            self.session.concluded = repr(self.params)
         self.session.save_if_filed()
 
     def price(self, plan: Session) -> float:

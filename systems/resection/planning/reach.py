@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 import hashlib
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +26,19 @@ from plants.snake.snake_body import CULPRIT, OK, body_of, check_body, place
 from plants.tissue.labels import BRAIN, CRITICAL, NAMES, TUMOUR
 from plants.tissue.space import FREE, SOLID, first_forbidden
 from plants.tissue.volume import Volume
-from systems.common.archive import read_archive, write_archive
+from systems.common.archive import (
+    check_arrays,
+    read_archive,
+    sensible,
+    write_archive,
+)
 from systems.resection.planning.draws import Draws, new_draws
 from systems.resection.planning.entry import PILOT, entry_pass
 from systems.resection.planning.growth import grow, tilted, tool_posture
 from systems.resection.planning.session import Session
+
+FORMAT = 1
+"""Of the file of what is reachable."""
 
 ROUND = 20_000
 """Attempts between two looks at what is left, at effort 1."""
@@ -200,6 +209,7 @@ def save_reach(
 ) -> None:
     """Writes the reachable part, and what it was computed for."""
     meta = {
+        "format": FORMAT,
         "key": _key(session, seed, effort),
         "fraction": reach.fraction,
         "time": reach.time,
@@ -213,22 +223,33 @@ def save_reach(
 def load_reach(path: Path, session: Session, seed: int, effort: float) -> Reach | None:
     """The reachable part that was saved; None if there is none for this."""
     try:
-        meta, arrays = read_archive(path, "reach")
+        meta, arrays = read_archive(path, "reach", FORMAT)
+        if meta["key"] != _key(session, seed, effort):
+            return None
+        with sensible(path, "reach"):
+            return _restored(meta, arrays, session)
     except ValueError:
         return None  # it can be computed again
-    if meta["key"] != _key(session, seed, effort) or "x" not in arrays:
-        return None
-    lumps = [Lump(**row) for row in meta["lumps"]]
-    return Reach(
-        arrays["mask"],
-        meta["fraction"],
-        meta["time"],
-        meta["steps"],
-        lumps,
-        arrays["x"],
-        arrays["parent"],
-        1,
+
+
+def _restored(meta: dict[str, Any], arrays: dict[str, Any], session: Session) -> Reach:
+    mask, lumps = arrays["mask"], [Lump(**row) for row in meta["lumps"]]
+    check_arrays(
+        arrays,
+        {
+            "mask": ("b1", session.volume.labels.shape),
+            "x": ("f8", ("nodes", 7)),
+            "parent": ("i4", ("nodes",)),
+        },
     )
+    share = np.count_nonzero(mask) / np.count_nonzero(session.volume.labels == TUMOUR)
+    if (mask & (session.volume.labels != TUMOUR)).any() or share != meta["fraction"]:
+        raise ValueError("mask and fraction are not the tumour's")
+    x, parent = arrays["x"], arrays["parent"]
+    if ((parent < 0) | (parent > len(x))).any():
+        raise ValueError("a parent that there is not")
+    time, steps = float(meta["time"]), int(meta["steps"])
+    return Reach(mask, share, time, steps, lumps, x, parent, 1)
 
 
 def _key(session: Session, seed: int, effort: float) -> str:

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,9 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
+from plants.tissue.tissue import Grid, Tissue
 from plants.tissue.volume import Channel, Volume
-from systems.common.archive import read_archive, write_archive
+from systems.common.archive import read_archive, sensible, write_archive
 from systems.common.parameter import check
 from systems.resection.planning.feasibility import (
     NEVER,
@@ -30,6 +32,7 @@ from systems.resection.planning.procedure import (
     widest_bend,
     with_tool,
 )
+from systems.resection.planning.saved import check_removed, check_saved
 from systems.resection.planning.sweep import LIMIT, posture_at, sweep_procedure
 from systems.resection.planning.tree import (
     Tree,
@@ -53,6 +56,9 @@ FORMAT = 3
 STROKES = "strokes"
 """Kind of a step that is no procedure: see `strokes`."""
 
+UPDATE = "update"
+"""Kind of a step in which the tissue is taken as an image shows it now."""
+
 ACCESS = "access"
 """Kind of a step in which the access robot is set anew."""
 
@@ -67,7 +73,7 @@ class Step:
     Attributes:
         name: What it is called.
         kind: "entry", "elementary", "volume", "strokes", "home" or "access": the
-            robot withdrawn, and set anew at the end of another channel.
+            robot withdrawn, and set anew at the end of another channel, or "update".
         first: Its first visit in the route.
         last: One past its last visit.
         nodes: Nodes of the tree before it.
@@ -166,6 +172,8 @@ class Session:
         """
         if not self.steps:
             raise ValueError("there is no step to undo")
+        if self.steps[-1].kind == UPDATE:
+            raise ValueError("what was measured cannot be undone")
         step = self.steps.pop()
         self.concluded = ""
         self.volume.undo(step.first - 1)
@@ -215,9 +223,9 @@ class Session:
             body = body_of(params, self.clearance, self.accuracy)
         own, start = self._in_entry(procedure, params)
         clearance = self.volume.channel - params.body_radius
-        refusal = check_jam(procedure, clearance, params) or check_reach(
-            own, start, params
-        )
+        refusal = check_jam(
+            procedure, clearance, params, self.clearance, self.accuracy
+        ) or check_reach(own, start, params)
         if refusal:
             if refusal.where is not None:
                 refusal.where = (self.X_WE @ [*refusal.where, 1.0])[:3].tolist()
@@ -335,20 +343,45 @@ class Session:
         if self.steps and self.steps[-1].kind != "home":
             self.go_home()
         before = self.standing()
-        visit_ = int(self.tree.size[1])
-        self.volume.bore(Channel(np.array(X_WE, float), self.volume.depth, visit_))
+        visit = int(self.tree.size[1])
+        self.volume.bore(Channel(np.array(X_WE, float), self.volume.depth, visit))
+        self._begin_at_home()
+        name = name or f"entry {1 + len(self.volume.more)}"
+        return self.record(name, ACCESS, before)
+
+    def _begin_at_home(self) -> None:
+        """Lets a tree of its own begin at home: nothing driven before is relied on."""
         self.stand()
         self.make_room()
         tree, c = self.tree, np.empty((POINTS, 3))
         place(self.body, self.home, c)
-        node = int(tree.size[0])
+        node, visit = int(tree.size[0]), int(tree.size[1])
         tree.x[node], tree.tip[node] = self.home, c[7]
         tree.parent[node], tree.depth[node] = -1, 0
-        tree.route[visit_] = node
-        tree.size[:] = node + 1, visit_ + 1, node
+        tree.route[visit] = node
+        tree.size[:] = node + 1, visit + 1, node
         enlist_all(tree)
-        name = name or f"entry {1 + len(self.volume.more)}"
-        return self.record(name, ACCESS, before)
+
+    def update(self, tissue: Tissue, seen: NDArray[np.bool_] | None = None) -> Step:
+        """Takes the tissue as an image, and a scan of the cavity, show it now.
+
+        The robot goes home, and relies on no way that it drove before: what it
+        still can do is checked against what is there.
+
+        Args:
+            tissue: Of an image taken meanwhile: the tumour that is left, and what is
+                critical, in the same frame P.
+            seen: Voxels found to be tissue, as `Volume.retarget` takes them.
+
+        Raises:
+            ValueError: If the tumour that is left lies beyond the grid.
+        """
+        if self.steps and self.steps[-1].kind != "home":
+            self.go_home()
+        self.volume.retarget(tissue, seen)
+        before = self.standing()
+        self._begin_at_home()
+        return self.record("update", UPDATE, before)
 
     def thought(self) -> "Session":
         """The same as it stands now, to be gone on with without consequence."""
@@ -426,6 +459,8 @@ class Session:
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
             "home": home,
+            "image": v.image
+            and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
             "more": [
                 {"X_WE": c.X_WE.tolist(), "depth": c.depth, "time": c.time}
                 for c in v.more
@@ -438,14 +473,19 @@ def load_session(path: Path) -> Session:
     """Resumes a session from its file.
 
     Raises:
-        ValueError: If the file is not there or damaged; the one before is offered.
+        ValueError: If the file is not there or damaged, and the one before is offered;
+            or if what it says makes no sense.
     """
-    meta, arrays = read_archive(path, "session")
-    if meta["format"] != FORMAT:
-        raise ValueError(
-            f"session {str(path)!r} has format {meta['format']}, expected {FORMAT}: "
-            "it was planned by another version; plan it anew"
-        )
+    meta, arrays = read_archive(path, "session", FORMAT)
+    with sensible(path, "session"):
+        session = _restored(meta, arrays)
+    session.file = path
+    return session
+
+
+def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
+    """The session of a file's plain data and arrays, held against each other."""
+    check_saved(meta, arrays)
     volume = Volume(
         arrays["labels"],
         arrays["origin"],
@@ -458,6 +498,8 @@ def load_session(path: Path) -> Session:
         Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
         mask_volume=meta["mask_volume"],
         notes=meta["notes"],
+        image=meta.get("image")
+        and Grid(tuple(meta["image"]["sizes"]), np.array(meta["image"]["X_PI"])),
         more=[
             Channel(np.array(row["X_WE"]), row["depth"], row["time"])
             for row in meta["more"]
@@ -480,7 +522,7 @@ def load_session(path: Path) -> Session:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))
     session.concluded = meta["concluded"]
-    session.file = path
+    check_removed(session)
     return session
 
 

@@ -147,14 +147,14 @@ def test_a_run_that_breaks_keeps_what_it_has(tmp_path, monkeypatch):
     from diagrams.studies import load_scenario
     from systems.motion.joint_commands import JointCommands
 
-    follow = JointCommands._update
+    follow = JointCommands._calc_next
 
     def broken(self, context):
         if context.get_time() > 0.3:
             raise RuntimeError("the arm fell off")
         return follow(self, context)
 
-    monkeypatch.setattr(JointCommands, "_update", broken)
+    monkeypatch.setattr(JointCommands, "_calc_next", broken)
     scenario = load_scenario("gauze_static", duration=1.0)
     run = run_scenario(scenario, tmp_path, with_replay=False)
     assert "the arm fell off" in run.error

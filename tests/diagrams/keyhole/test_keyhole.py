@@ -10,6 +10,7 @@ from diagrams.bedside.bedside import add_bedside
 from diagrams.common.scenario import ScenarioError
 from diagrams.keyhole.operation import circle, outline
 from diagrams.keyhole.plots import plots
+from diagrams.keyhole.scenario import BASE
 from diagrams.studies import load_scenario
 from plants.instruments.tube import channel_frame
 from plants.snake.kinematics import forward
@@ -44,6 +45,19 @@ def test_the_snake_leaves_the_tube_after_the_gate_alone():
     assert out[-1] == 1.0
 
 
+def test_approach():
+    """Round the surgeon's moving tool, unloaded, to the gate."""
+    figures = run("keyhole_approach", "duration=14").metrics
+    assert figures["min_tool_clearance"] >= 4e-3
+    assert figures["gate_opened"] < 14.0
+    assert figures["rms_lateral_force"] < 0.15
+    assert [one["phase"] for one in figures["phases"]][:3] == [
+        "probe",
+        "approach",
+        "station",
+    ]
+
+
 def test_everything_hangs_on_the_sensor():
     scenario = load_scenario("keyhole_circle", duration=1.0)
     added = []
@@ -74,8 +88,8 @@ def test_a_turn_of_the_circle_is_the_circle():
 def test_a_resection_is_planned_with_the_base_out_of_the_tube():
     scenario = load_scenario("keyhole_circle", ["task=resect"])
     case = outline(scenario)
-    assert case.session.params.travel[0] == -scenario.instrument.gap
-    assert case.plan.posture(0.0)[0] >= -scenario.instrument.gap
+    assert case.session.params.travel[0] == -scenario.instrument.gap - BASE
+    assert case.plan.posture(0.0)[0] >= -scenario.instrument.gap - BASE
 
 
 def test_plots():

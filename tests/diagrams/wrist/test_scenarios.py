@@ -17,15 +17,15 @@ from tests.runs import run
 
 def test_arcs_about_a_wrong_guess():
     figures = run("pwe_arc").metrics
-    assert figures["fulcrum_convergence_time"] <= 2.0
+    assert 5.0 < figures["fulcrum_convergence_time"] <= 7.0  # the arcs begin at 5
     assert figures["rms_lateral_force"] <= 0.1
-    assert figures["lateral_convergence_time"] <= 0.5
+    assert figures["lateral_convergence_time"] <= 5.5
     assert figures["estimates_refused"] == 0
 
 
 def test_arcs_under_breathing():
     figures = run("pwe_arc_breathing").metrics
-    assert figures["fulcrum_convergence_time"] <= 10.0
+    assert 5.0 < figures["fulcrum_convergence_time"] <= 10.0
     assert figures["fulcrum_error_3s"] <= 2e-3
     assert figures["rms_lateral_force"] <= 0.1
     assert figures["breathing_rate_estimate"] == pytest.approx(0.2, rel=0.02)
@@ -59,12 +59,10 @@ def test_known_fulcrum_under_breathing():
     assert figures["rms_lateral_force"] < 0.03
 
 
-def test_off_stands_still_for_the_wall_is_loaded():
-    result = run("pwe_arc", "wrist=off")
-    tip = result.robot.tool.tip
-    assert result.metrics["max_lateral_force"] > 5.0
-    assert np.ptp(tip[-600:], axis=0).max() < 1e-4
-    assert result.metrics["time_frozen"] > 10.0
+def test_off_gives_way_whenever_the_wall_is_loaded():
+    figures = run("pwe_arc", "wrist=off").metrics
+    assert 5.0 < figures["max_lateral_force"] < 10.0
+    assert figures["time_over_limit"] < 6.0 < 10.0 < figures["time_frozen"]
 
 
 def test_a_lost_sensor_stops_the_task_until_it_is_back():

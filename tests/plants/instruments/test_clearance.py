@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from plants.instruments.clearance import Clearance
+from plants.instruments.clearance import Capsule, Clearance, add_clearance
 from plants.instruments.instrument import InstrumentParams
 from plants.instruments.posed_tools import PosedToolsParams
 from systems.common.signal import columns
@@ -57,23 +57,26 @@ def test_clearance_is_the_distance_of_the_shafts_surfaces(make_scene, seed):
         assert value == pytest.approx(expected, abs=2e-5)
 
 
+def test_clearance_is_the_scene_graphs_signed_distance(make_scene):
+    scene = make_scene(p_WP=(0.03, -0.02, -0.13))
+    measured = scene.output(scene.clearance, "clearance")
+    for value, distance in zip(measured, scene.signed_distances(), strict=True):
+        assert value == pytest.approx(distance, abs=2e-5)
+
+
+SHAFT = Capsule(0, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.1]]), 0.0025)
+
+
 def test_columns_are_roles_or_names_where_a_role_is_shared():
-    assert columns(
-        Clearance(object(), {"obstacle": 1, "target": 2, "camera": 3}).signals[
-            "clearance"
-        ]
-    ) == (
-        "obstacle",
-        "target",
-        "camera",
-    )
+    dut = Clearance(SHAFT, dict.fromkeys(("obstacle", "target", "camera"), SHAFT))
+    assert columns(dut.signals["clearance"]) == ("obstacle", "target", "camera")
     tools = (("near", "obstacle"), ("far", "obstacle"), ("S", "target"))
-    dut = Clearance(object(), {"near": 1, "far": 2, "S": 3}, tools)
+    dut = Clearance(SHAFT, dict.fromkeys(("near", "far", "S"), SHAFT), tools)
     assert columns(dut.signals["clearance"]) == ("near", "far", "target")
 
 
 def test_missing_geometry_is_refused():
     with pytest.raises(ValueError, match=r"no geometry of \['camera'\]"):
-        Clearance(object(), {"obstacle": 1, "target": 2})
+        Clearance(SHAFT, {"obstacle": SHAFT, "target": SHAFT})
     with pytest.raises(ValueError, match="no geometry of the robot"):
-        Clearance(None, {"obstacle": 1, "target": 2, "camera": 3})
+        add_clearance(None, None, None, None, None)

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 import pytest
 
-from systems.common.compiled import announced, compiled, packed
+from systems.common.compiled import InTree, UserWide, announced, compiled, packed
 
 
 @dataclass
@@ -50,6 +50,20 @@ def test_division_by_zero_gives_infinity():
         return 1.0 / x
 
     assert inverse(0.0) == np.inf
+
+
+def test_where_nothing_can_be_written_it_is_compiled_all_the_same(monkeypatch):
+    def refuse(locator):
+        raise OSError("read-only")
+
+    for place in (InTree, UserWide):
+        monkeypatch.setattr(place, "ensure_cache_path", refuse)
+
+    @compiled
+    def thrice(x):
+        return 3.0 * x
+
+    assert thrice(2.0) == 6.0
 
 
 def test_a_function_of_no_file_is_compiled_too():

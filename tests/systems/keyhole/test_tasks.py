@@ -7,7 +7,6 @@ import pytest
 
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
-from plants.arm.signals import ArmState
 from plants.instruments.tube import TubeParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
@@ -29,14 +28,16 @@ def test_tube_pose_is_the_plants():
     tube = TubeParams()
     plant = make_controller_plant(instrument=tube)
     context = plant.CreateDefaultContext()
-    dut = TubeLocation(tube, lead=0.01)
+    dut = TubeLocation(tube)
     own = dut.CreateDefaultContext()
     for _ in range(5):
         q = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
-        v = rng.uniform(-0.5, 0.5, 7)
-        dut.GetInputPort("arm_state").FixValue(own, flat(ArmState(tuple(q), tuple(v))))
+        lag, step = rng.uniform(-0.01, 0.01, (2, 7))
+        dut.GetInputPort("arm_state").FixValue(own, np.append(q, np.zeros(7)))
+        dut.GetInputPort("posture").FixValue(own, q + lag)
+        dut.GetInputPort("next").FixValue(own, q + lag + step)
         seen = view(TubePose, np.array(dut.GetOutputPort("tube").Eval(own)))
-        plant.SetPositions(context, q + 0.01 * v)
+        plant.SetPositions(context, q + step)
         X = plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(context)
         np.testing.assert_allclose(seen.p, X.translation(), atol=1e-12)
         np.testing.assert_allclose(seen.x, X.rotation().col(0), atol=1e-12)
@@ -61,8 +62,8 @@ def test_a_target_in_the_organ_is_one_in_the_channel():
         A, B = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
         R_WE, R_WC = (R * np.sign(np.linalg.det(R)) for R in (A, B))
         p_WE, p_WP, p_E = rng.normal(size=(3, 3))
-        tube = TubePose(p_WP, R_WC[:, 0], R_WC[:, 2])
-        target = ToolTarget(p_E, *np.eye(3)[:2])
+        tube = flat(TubePose(p_WP, R_WC[:, 0], R_WC[:, 2]))
+        target = flat(ToolTarget(p_E, *np.eye(3)[:2]))
         out = in_channel(target, R_WE, p_WE, tube, 0.04)
         p_WC = p_WP + 0.04 * R_WC[:, 2]
         np.testing.assert_allclose(p_WC + R_WC @ out[:3], p_WE + R_WE @ p_E, atol=1e-12)

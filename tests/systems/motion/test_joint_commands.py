@@ -13,9 +13,11 @@ from plants.arm.arm import SetPoint
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
 from systems.common.signal import flat, size, vector
-from systems.common.signals import ToolMotion
+from systems.common.signals import Permission, ToolMotion
+from systems.common.stops import Stop
 from systems.motion import joint_commands
 from systems.motion.joint_commands import (
+    LIMP,
     JointCommands,
     JointCommandsParams,
     free_velocity,
@@ -101,18 +103,20 @@ def test_twist_keeps_the_roll():
     du = np.cross([0.3, 0.1, 0.2], u)
     tip = (0.0, 0.0, -0.1)
     tool = ToolMotion(tip, vector(u), (0.01, 0.0, 0.0), vector(du), 1.0)
-    w, v = joint_commands.tool_twist(tip, vector(u), tool, 1.0, PERIOD, 0.3)
+    w, v = joint_commands.tool_twist(tip, vector(u), tool, 1.0, PERIOD, 0.3, 0.1)
     twist = np.array([*w, *v])
     assert twist[:3] @ u == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(np.cross(twist[:3], u), du, atol=1e-12)
     np.testing.assert_allclose(twist[3:], [0.01, 0.0, 0.0])
 
 
-def follow(tool_at, seconds, params=None):
+def follow(tool_at, seconds, params=None, told=None):
     """Runs the block on a commanded motion; rows of posture, set-point, status."""
     dut = JointCommands(params)
     context = dut.CreateDefaultContext()
     simulator = Simulator(dut, context)
+    for name, value in (told or {}).items():
+        dut.GetInputPort(name).FixValue(context, value)
     rows = []
     for k in range(round(seconds * 120)):
         dut.GetInputPort("tool").FixValue(context, flat(tool_at(k / 120)))
@@ -160,6 +164,45 @@ def test_too_fast_a_command_is_reported_and_bounded():
     step = np.diff([posture for posture, _, _ in rows], axis=0) / PERIOD
     assert (np.abs(step) <= speed + 1e-6).all()
     assert rows[-1][2][0] == 1.0
+
+
+def off_fulcrum(posture):
+    """How far the shaft's line passes the origin, in m."""
+    _, p, u, _ = kinematics(posture)
+    return np.linalg.norm(p - (p @ u) * u)
+
+
+def test_where_not_all_can_be_had_the_fulcrum_comes_first():
+    """Joints too slow for the circle: the tip lags, the shaft keeps to its fulcrum."""
+    params = JointCommandsParams(joint_speed=0.02, fulcrum_first=30.0)
+    told = {"fulcrum": np.zeros(3)}
+    first = [off_fulcrum(row[0]) for row in follow(circle, 2.0, params, told)]
+    last = [off_fulcrum(row[0]) for row in follow(circle, 2.0, params)]
+    assert max(first) < 1.2e-3
+    assert max(last) > 4.0 * max(first)
+
+
+def test_an_arm_that_does_not_follow_goes_limp():
+    stuck = np.concatenate([READY_POSTURE, np.zeros(7)])
+    params = JointCommandsParams()
+    rows = follow(circle, 1.0, params, {"fulcrum": np.zeros(3), "arm_state": stuck})
+    status = np.array([row[2][0] for row in rows])
+    assert (status == LIMP).any()
+    limp = int(np.flatnonzero(status == LIMP)[0])
+    np.testing.assert_allclose(rows[limp][0], READY_POSTURE)  # told where it is
+    assert (status[limp : limp + round(params.limp_time * 120)] == LIMP).all()
+
+
+@pytest.mark.parametrize("stop", [Stop.WALL_LOADED, Stop.SENSOR_LOST])
+def test_a_loaded_wall_makes_the_arm_give_way(stop):
+    permission = flat(Permission(0.0, float(stop)))
+    away = np.array(READY_POSTURE) + 0.01
+    measured = np.concatenate([away, np.zeros(7)])
+    told = {"permission": permission, "arm_state": measured}
+    posture, set_point, status = follow(circle, 0.1, None, told)[-1]
+    np.testing.assert_allclose(posture, away)
+    assert abs(set_point[:7] - away).max() < 1e-3  # but for the load's weight
+    assert status[0] == LIMP
 
 
 def test_quadprog_is_asked_only_where_bounds_are_met(monkeypatch):

@@ -12,6 +12,7 @@ from systems.common.signal import example, flat
 from systems.switching.classical_planner import (
     ClassicalParams,
     ClassicalPlanner,
+    field_sum,
     summed_fields,
 )
 from systems.switching.perception import Perception, PerceptionParams, perceive
@@ -158,16 +159,40 @@ def test_what_is_not_seen_does_not_matter():
     assert dut.GetOutputPort("v_R").Eval(context).tolist() == [0.5, 0.0]
 
 
-def test_the_sum_vanishes_between_two_obstacles():
-    params = ClassicalParams()
-    pair = [Seen(0.0, 4.1, 5.0, 0.6, 0.0, 0.0), Seen(1.0, 5.9, 5.0, 0.6, 0.0, 0.0)]
-    speeds = [
-        summed_fields(params, (5.0, y), (5.0, 10.0), pair)[1]
-        for y in np.linspace(3.0, 5.0, 200)
-    ]
-    assert speeds[0] > 0.49 and min(speeds) < 0.0  # it turns back before the gap
-    with pytest.raises(ValueError, match=r"form='sum': expected one of khatib"):
-        ClassicalPlanner(ClassicalParams(form="sum"))
+PAIR = [Seen(0.0, 4.1, 5.0, 0.6, 0.0, 0.0), Seen(1.0, 5.9, 5.0, 0.6, 0.0, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("params", "zero"),
+    [
+        (ClassicalParams(clipped=False, repulsion=0.1), 4.572),
+        (ClassicalParams(clipped=False, repulsion=0.2), 4.452),
+        (ClassicalParams(clipped=False, repulsion=0.01), None),
+        (ClassicalParams(clipped=False, form="printed"), None),
+        (ClassicalParams(form="printed"), None),
+        (ClassicalParams(repulsion=0.01), 4.557),
+    ],
+)
+def test_where_the_sum_vanishes_before_a_gap(params, zero):
+    """Half-way is y = 5: the gap itself, where the thesis has its Figure 8."""
+    line = np.linspace(3.0, 5.0, 2001)
+    sums = [field_sum(params, (5.0, y), (5.0, 10.0), PAIR)[1] for y in line]
+    turns = np.flatnonzero(np.array(sums) < 0.0)
+    assert sums[0] > 0.4
+    if zero is None:
+        assert not len(turns)
+    else:
+        assert line[turns[0]] == pytest.approx(zero, abs=2e-3)
+
+
+def test_equation_2_as_printed_leads_nowhere():
+    params = ClassicalParams(attraction="printed", clipped=False)
+    v = summed_fields(params, (5.0, 0.0), (5.0, 10.0), [])
+    assert v[0] == pytest.approx(v[1]) and hypot(*v) == pytest.approx(0.5)
+    for bad in ({"attraction": "sum"}, {"form": "sum"}):
+        (name,) = bad
+        with pytest.raises(ValueError, match=rf"{name}='sum': expected one of"):
+            ClassicalPlanner(ClassicalParams(**bad))
 
 
 def test_both_forms_push_away_and_keep_the_speed():

@@ -1,0 +1,1 @@
+"""Scenarios run in real time, and whoever watches takes part."""

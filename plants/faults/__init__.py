@@ -1,0 +1,1 @@
+"""What fails in the world: sensors, frames, a slow arm."""

@@ -1,0 +1,120 @@
+"""A wire that carries a signal wrongly for a while: sensors fail, an arm is slow."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from systems.common.block import Block
+from systems.common.parameter import check, parameter
+from systems.common.signal import view
+from systems.common.signals import TrackedShaft, Wrench
+from systems.common.step_block import length
+
+type Breaks = Callable[[np.ndarray, np.ndarray, float, float], None]
+"""Spoils a signal's elements in place: these, those given before, size, period [s]."""
+
+
+def _stuck(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    now[:] = before
+
+
+def _flipped(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    wrench = view(Wrench, now)
+    wrench.f[:], wrench.m[:] = -wrench.f, -wrench.m
+
+
+def _biased(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    view(Wrench, now).f[0] += size
+
+
+def _silent(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    now[:] = 0.0
+
+
+def _in_future(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    view(TrackedShaft, now).time[...] += size
+
+
+def _nan(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    now[:] = np.nan
+
+
+def _slow(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    now[:] = before + np.clip(now - before, -size * period, size * period)
+
+
+KINDS: dict[str, Breaks] = {
+    "force_stuck": _stuck,
+    "force_flipped": _flipped,
+    "force_bias": _biased,
+    "force_silent": _silent,
+    "frame_future": _in_future,
+    "estimate_nan": _nan,
+    "tension_nan": _nan,
+    "arm_slow": _slow,
+}
+"""What can fail. Sizes: N along x in W of `force_bias` (of one sample: a spike), s that
+a frame is stamped too late, rad/s of the slow arm's joints; the others have none."""
+
+
+@dataclass
+class Fault:
+    """Something that fails in the world for a while."""
+
+    kind: str = parameter("force_stuck", "what fails", choices=tuple(KINDS))
+    start: float = parameter(0.0, "from when", "s", least=0.0, most=1e5)
+    duration: float = parameter(1.0, "for how long", "s", above=0.0, most=1e5)
+    size: float = parameter(0.0, "how much, in the kind's unit", least=-1e8, most=1e8)
+
+
+class FaultyWire(Block):
+    """Carries a signal; while its fault lasts it carries it wrongly.
+
+    Port ``whole`` accepts the signal as it is.
+
+    Port ``told`` emits what is told of it.
+    """
+
+    def __init__(
+        self, fault: Fault | None = None, signal: Any = Wrench, period: float = 1 / 120
+    ) -> None:
+        """Makes the block.
+
+        Args:
+            fault: What fails; its kind has to suit the signal.
+            signal: The signal's declaration, or its size.
+            period: Of the signal's samples, in s.
+        """
+        super().__init__()
+        self._fault = fault or Fault()
+        check(self._fault, "faults")
+        self._breaks, self._period = KINDS[self._fault.kind], period
+        size = length(signal)
+        if isinstance(signal, int):
+            self._whole = self.vector_in("whole", [0.0] * size)
+        else:
+            self._whole = self.signal_in("whole", signal)
+            self.signals["told"] = signal
+        # What was told at the last sample, and whether the fault is on.
+        self.DeclareDiscreteState(np.append(np.zeros(size), self._is_on(0.0)))
+        reads = {self._whole.ticket(), self.xd_ticket()}
+        self.vector_out("told", size, self._calc_told, reads)
+        self.update_every(period, self._update)
+
+    def _calc_told(self, context: Any) -> np.ndarray:
+        whole = self._whole.Eval(context).copy()
+        state = context.get_discrete_state_vector().value()
+        if state[-1]:
+            self._breaks(whole, state[:-1], self._fault.size, self._period)
+        return whole
+
+    def _is_on(self, time: float) -> float:
+        """1 if a sample at a time is told wrongly, else 0."""
+        since = time + 0.5 * self._period - self._fault.start
+        return float(0.0 < since <= self._fault.duration)
+
+    def _update(self, context: Any) -> np.ndarray:
+        is_on = self._is_on(context.get_time() + self._period)
+        return np.append(self._calc_told(context), is_on)
