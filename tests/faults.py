@@ -91,7 +91,8 @@ ROWS = {
     "arm slow, known": Row(
         ARCS, also(fault("arm_slow", 6, 12, 4, 0.01), *SHORT, "wrist=known")
     ),
-    "wall jumps 30 mm": Row("pwe_step", jump, 16.0, 0.3),
+    # 15 N of the spring and what its damper adds, before anything can move.
+    "wall jumps 30 mm": Row("pwe_step", jump, 25.0, 0.3),
     "tension NaN": Row(
         "snake_circle", also(fault("tension_nan", 1, 3, 1), "duration=5")
     ),

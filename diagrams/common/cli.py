@@ -31,6 +31,7 @@ examples:
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
   trocar resect resect_paper                plan a resection by hand
+  trocar export out/resect_paper.session --to viewer   what a viewer can load
   trocar import FILE --kind jigsaws         another's recording as one of ours
   trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
@@ -150,6 +151,19 @@ def make_parser() -> argparse.ArgumentParser:
     )
     resect.add_argument(
         "--set", dest="overrides", action="append", default=[], metavar="KEY.SUB=VALUE"
+    )
+    export = commands.add_parser(
+        "export",
+        help="write a resection's session for a viewer: label maps, path, channels",
+        description="Writes label maps on the mask's own grid (NRRD, NIfTI) and on "
+        "the plan's, the tool's path (VTK), the channels (OBJ), in LPS and mm, and "
+        "the plan (JSON). Needs the extra `images`.",
+    )
+    export.add_argument(
+        "source", metavar="SESSION", type=Path, help="a session's file, or a run's DIR"
+    )
+    export.add_argument(
+        "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
     )
     add_import(commands)
     campaign = commands.add_parser(
@@ -425,6 +439,20 @@ def resect_command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def export_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar export`."""
+    try:
+        from diagrams.resection.export import export, session_of
+    except ModuleNotFoundError as error:
+        raise ScenarioError(
+            f"no module {error.name!r}: export needs the extra, "
+            "pip install 'trocar[images]'"
+        ) from error
+    for path in export(session_of(arguments.source), arguments.to):
+        print(path)
+    return 0
+
+
 def campaign_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar campaign`."""
     try:
@@ -456,6 +484,7 @@ COMMANDS = {
     "keys": keys_command,
     "access": access_command,
     "resect": resect_command,
+    "export": export_command,
     "campaign": campaign_command,
     "import": import_command,
 }
@@ -485,5 +514,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"trocar: error: {reason}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("trocar: interrupted before the run began", file=sys.stderr)
+        before = " before the run began" if arguments.command == "run" else ""
+        print(f"trocar: interrupted{before}", file=sys.stderr)
         return 130

@@ -25,6 +25,7 @@ FIGURES = {
     "contact": Figure("", "whether the tools touched"),
     "time_to_target": Figure("s", "until the tip was at its target to stay"),
     "final_tip_error": Figure("m", "of the tip from its target at the end"),
+    "recording_played": Figure("%", "of the tools' recordings, of the shortest share"),
     "min_tool_clearance": Figure("m", "least true gap to the obstacle tools"),
     "min_target_clearance": Figure("m", "least true gap to the surgeon's tool"),
     "min_camera_clearance": Figure("m", "least true gap to the endoscope"),

@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from time import perf_counter
 from typing import Any
+import weakref
 
 import numpy as np
 from pydrake.common import RandomGenerator
@@ -37,6 +38,7 @@ from diagrams.common.results import Results, results, save_scenario
 from diagrams.common.scenario import ScenarioError, refusals
 from diagrams.common.study import Study
 from diagrams.studies import build, check_scenario, get_study
+from systems.common.block import Block
 from systems.common.compiled import rehearse
 from systems.common.stopwatch import STOPWATCH
 
@@ -54,7 +56,8 @@ class Run:
     Attributes:
         case: What ran.
         study: The system that ran it.
-        diagram: The root diagram; the study's own is its subsystem "station".
+        diagram: The root diagram; the study's own is its subsystem "station". That of
+            a scenario is gone when its run is.
         logged: Ports that were logged, and their signals.
         signals: Column name to samples; "time" [s] is the common clock.
         wall_time: Wall seconds of the advance alone.
@@ -164,7 +167,32 @@ def simulate(
         ScenarioError: If the scenario cannot run.
     """
     case = scenario if isinstance(scenario, Case) else prepare(scenario, progress)
-    return simulate_diagram(case, build(case), meshcat, progress)
+    return owned(simulate_diagram(case, build(case), meshcat, progress))
+
+
+def owned(run: Run) -> Run:
+    """The run; when it is dropped its diagram, which nobody else has, goes with it.
+
+    Drake keeps a Python block, and all that it refers to, for ever: its callbacks refer
+    to the block. Emptied it takes a tenth of the room.
+    """
+    weakref.finalize(run, emptied, [*blocks_of(run.diagram)]).atexit = False
+    return run
+
+
+def blocks_of(diagram: Any) -> Iterator[Block]:
+    """All Python blocks in a diagram and in the diagrams within it."""
+    for system in diagram.GetSystems():
+        if isinstance(system, Block):
+            yield system
+        if hasattr(system, "GetSystems"):
+            yield from blocks_of(system)
+
+
+def emptied(blocks: list[Block]) -> None:
+    """Takes from blocks all that they refer to: they will not be asked again."""
+    for block in blocks:
+        block.__dict__.clear()
 
 
 def simulate_diagram(
@@ -309,7 +337,7 @@ def run_scenario(
             with into.file("signals.csv") as draft:
                 save_signals(run.signals, draft)
 
-        run = simulate_diagram(case, diagram, meshcat, progress, save)
+        run = owned(simulate_diagram(case, diagram, meshcat, progress, save))
         with survived(run, "results could not be saved: "):
             write(run, into)
             if meshcat is not None:

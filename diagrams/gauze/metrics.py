@@ -6,7 +6,8 @@ import numpy as np
 
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
-from diagrams.gauze.tools import gap, logged
+from diagrams.gauze.tools import TARGET, gap, logged
+from plants.surgeon.recording import load_recording
 from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
@@ -45,6 +46,14 @@ def stops(time: np.ndarray, codes: np.ndarray) -> list[dict[str, Any]]:
     return sorted(found, key=lambda one: one["start"])
 
 
+def recordings_played(run: Any) -> float | None:
+    """The least share of a tool's recording that the run played; None without one."""
+    time = float(run.signals["time"][-1])
+    tools = [*run.scenario.of_role(TARGET), *run.scenario.obstacles]
+    ends = [float(load_recording(t.recording)[0][-1]) for t in tools if t.recording]
+    return min((min(time / end, 1.0) for end in ends), default=None)
+
+
 def in_cone(points: np.ndarray, cone: Any) -> np.ndarray:
     """Whether each point (n, 3) lies in its view cone, shape (n,)."""
     rays = points - cone.apex
@@ -79,6 +88,9 @@ def measure(run: Any) -> dict[str, Any]:
         "joint_limit_time": float(np.mean(run.joints.status.code == 1) * time[-1]),
         "stops": stops(time, run.navigation.stop.code),
     }
+    played = recordings_played(run)
+    if played is not None:
+        figures["recording_played"] = played
     figures |= bypass_figures(run, arrival, tip_error)
     if run.scenario.emulated:
         figures |= wrist_figures(run, run.scenario.measure_from)

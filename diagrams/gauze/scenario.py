@@ -167,6 +167,11 @@ def check_tools(scenario: GauzeScenario) -> None:
         if len(scenario.of_role(role)) != 1:
             called = [tool.name for tool in scenario.of_role(role)]
             raise ScenarioError(f"tools of role {role!r}={called}: expected one")
+    if not scenario.obstacles:
+        raise ScenarioError(
+            f"tools={names}: expected at least one of role {OBSTACLE!r}; a tool that "
+            "stays in its trocar is out of the way"
+        )
     for tool in scenario.of_role(TARGET) + scenario.obstacles:
         if tool.hunt.speed and tool.recording:
             raise ScenarioError(

@@ -13,6 +13,7 @@ from diagrams.common.scenario import refusals
 from diagrams.resection.operation import finish_plan, new_session, reach_of, resumed
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.labels import TUMOUR
+from plants.tissue.mask import load_mask
 from systems.resection.planning.feasibility_map import feasibility_map
 from systems.resection.planning.next_entry import NextEntry, next_entries
 from systems.resection.planning.planner import Planner
@@ -37,6 +38,7 @@ check | commit | undo                ask of the proposal, make it part of the pl
 map                                  where elementary volumes are feasible now
 finish                               let the planner do the rest
 entries | access N                   what further entries would add | take the N-th
+update FILE                          an image taken meanwhile replaces the mask
 list | quit                          the plan; the session is saved
 save FILE | load FILE                its procedures as JSON; commit those of a file"""
 
@@ -116,6 +118,9 @@ class Console:
             return "\n".join(f"{n}: {row}" for n, row in enumerate(rows, 1)) or "none"
         if command == "access":
             return self._access(words[1:])
+        if command == "update" and len(words) == 2:
+            self.session.update(load_mask(words[1], self.scenario.labels))
+            return f"updated; {self._share()}"
         if command == "list":
             rows = [
                 f"{n}: {step.name}, {1e9 * step.gained:.0f} mm3"

@@ -75,6 +75,7 @@ def measure(run: Any) -> dict[str, Any]:
         "procedures": sum(step.kind not in ("home", STROKES) for step in steps),
         "strokes": len(runs),
         "single_step_share": single_step_share(runs),
+        "access_time": run.case.access_time,
         "planning_time": run.case.planning_time,
         "reach_time": reach.time,
         "execution_time": run.case.done.time + run.simulated,

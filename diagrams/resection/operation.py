@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.common.case import Case
-from diagrams.common.progress import Progress
+from diagrams.common.progress import Progress, silent
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.execution import Execution, load_execution
@@ -31,7 +31,7 @@ from systems.resection.planning.reach import (
     load_reach,
     save_reach,
 )
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.session import UPDATE, Session, load_session
 from systems.resection.wires.procedure_player import schedule
 
 LOG_PERIOD = 0.1
@@ -47,6 +47,7 @@ class Operation(Case):
         tumour: Its name.
         reach: The reachable part; None if nothing was planned.
         refusals: What was refused: procedure, reason, where [m], gap [m].
+        access_time: Of proposing the entry and setting the session up, in s.
         planning_time: Of the procedures' checks and the planner, in s.
         done: What earlier runs carried out of the plan.
     """
@@ -55,6 +56,7 @@ class Operation(Case):
     tumour: str
     reach: Reach | None = None
     refusals: list[dict[str, Any]] = field(default_factory=list)
+    access_time: float = 0.0
     planning_time: float = 0.0
     done: Execution = field(default_factory=Execution)
 
@@ -74,12 +76,17 @@ def tissue_of(scenario: ResectionScenario) -> Tissue:
     return synthetic_tumour(scenario.tumour)
 
 
-def new_session(scenario: ResectionScenario) -> tuple[Session, str]:
+def new_session(
+    scenario: ResectionScenario, progress: Progress = silent
+) -> tuple[Session, str]:
     """A session at its beginning, and the tumour's name."""
     tissue = tissue_of(scenario)
     access = scenario.access
     if access.direction is None:
-        access = propose_access(tissue, access, scenario.snake).access
+        with progress("where to enter", "of what is tried") as show:
+            access = propose_access(
+                tissue, access, scenario.snake, progress=lambda share: show(share, 1.0)
+            ).access
     volume = make_volume(
         tissue,
         access,
@@ -107,7 +114,10 @@ def resumed(file: Path, fresh: Session) -> Session:
     """
     session = load_session(file)
     old, new = session.volume, fresh.volume
-    same = old.labels.shape == new.labels.shape and (old.labels == new.labels).all()
+    updated = any(step.kind == UPDATE for step in session.steps)  # it shows another
+    same = old.labels.shape == new.labels.shape and (
+        updated or bool((old.labels == new.labels).all())
+    )
     pairs = {"tumour or access": (bool(same), True), "margin": (old.margin, new.margin)}
     pairs |= {
         name: (getattr(session, name), getattr(fresh, name))
@@ -143,7 +153,9 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
         ValueError: If tumour, access or session's files make no sense.
     """
     file = Path(scenario.session) if scenario.session else None
-    session, tumour = new_session(scenario)
+    start = perf_counter()
+    session, tumour = new_session(scenario, progress)
+    access_time = perf_counter() - start
     if file is not None and file.is_file():
         session = resumed(file, session)
     session.file = file
@@ -180,6 +192,7 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
         tumour=tumour,
         reach=reach,
         refusals=refusals,
+        access_time=access_time,
         planning_time=planning_time,
         done=done,
     )

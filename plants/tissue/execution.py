@@ -104,6 +104,7 @@ def _restored(
         (next(touched), next(touched)),
         float(meta["way"]),
         arrays["tau"],
+        [int(move) for move in meta.get("bored", [])],
     )
     check_arrays(arrays, {"tau": ("i4", shape)})
     numbers = (done.time, done.way, done.index, done.posture, *done.removed)

@@ -16,7 +16,7 @@ from plants.tissue.image import MaskError
 from plants.tissue.labels import BRAIN, TUMOUR
 from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.mask_reader import Labelled
-from plants.tissue.tissue import Tissue, parts_by_size
+from plants.tissue.tissue import Grid, Tissue, parts_by_size
 from systems.common.parameter import check
 
 MOST_TIME = 120
@@ -113,7 +113,8 @@ def tissue_of(part: Labelled, component: int, name: str) -> Tissue:
     X_PV = part.X_PV.copy()
     X_PV[:3, 3] += X_PV[:3, :3] @ (np.array(part.corner) - 1)
     padded = np.pad(labels, 1, constant_values=BRAIN)
-    return Tissue(padded, X_PV, name, is_mask=True, notes=notes)
+    image = Grid(tuple(part.sizes), part.X_PV)
+    return Tissue(padded, X_PV, name, is_mask=True, notes=notes, image=image)
 
 
 def _chosen(sizes: NDArray[np.int64], component: int) -> int:

@@ -17,6 +17,19 @@ from systems.common.parameter import check, parameter
 
 
 @dataclass
+class Grid:
+    """A grid of voxels.
+
+    Attributes:
+        sizes: Voxels along its axes, three.
+        X_PI: From indices to P, (4, 4).
+    """
+
+    sizes: tuple[int, ...]
+    X_PI: NDArray[np.float64]
+
+
+@dataclass
 class Tissue:
     """What lies where before the operation.
 
@@ -27,6 +40,7 @@ class Tissue:
         is_mask: Whether its voxels are what a mask has, and not only samples of a
             shape.
         notes: What had to be assumed, or was left out.
+        image: The grid of the file it was read from; its own if None.
     """
 
     labels: NDArray[np.uint8]
@@ -34,6 +48,12 @@ class Tissue:
     name: str = ""
     is_mask: bool = False
     notes: list[str] = field(default_factory=list)
+    image: Grid | None = None
+
+    @property
+    def grid(self) -> Grid:
+        """The grid it was given on."""
+        return self.image or Grid(self.labels.shape, self.X_PV)
 
     def __post_init__(self) -> None:
         spacing = self.spacing

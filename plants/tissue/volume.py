@@ -19,7 +19,7 @@ from scipy import ndimage
 from plants.tissue.critical import Boxes, cover
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID, Space, as_bits, journals
-from plants.tissue.tissue import Tissue, parts_by_size, signed_distance
+from plants.tissue.tissue import Grid, Tissue, parts_by_size, signed_distance
 from systems.common.parameter import Rules, check, parameter
 
 Vector = NDArray[np.float64]
@@ -89,6 +89,7 @@ class Volume:
         mask_volume: Of the tumour as the mask has it, in m3; None if it is synthetic.
         notes: What was left out on the way here.
         more: Channels beside the first, in the order in which they are bored.
+        image: The grid on which the tissue was given; None if it is not known.
     """
 
     labels: NDArray[np.uint8]
@@ -106,6 +107,7 @@ class Volume:
     mask_volume: float | None = None
     notes: list[str] = field(default_factory=list)
     more: list[Channel] = field(default_factory=list)
+    image: Grid | None = None
     inside: NDArray[np.float32] = field(init=False, repr=False)
     roomy: NDArray[np.uint8] = field(init=False, repr=False)
     solid: NDArray[np.int64] = field(init=False, repr=False)
@@ -135,6 +137,49 @@ class Volume:
         if self.to_critical.size:
             allowed &= self.to_critical > self.margin
         return allowed.astype(np.uint8)
+
+    def retarget(self, body: Tissue, seen: NDArray[np.bool_] | None = None) -> None:
+        """Takes over what is there now; what is gone stays gone, and counts as it did.
+
+        Args:
+            body: The tissue of an image taken meanwhile, of what is left.
+            seen: Voxels that a scan of the cavity found to be tissue, (nx, ny, nz):
+                they are there though they were thought to be gone.
+
+        Raises:
+            ValueError: If the tumour that is left lies beyond the grid.
+        """
+        X_WV = np.linalg.inv(self.X_PW) @ body.X_PV
+        place = body.points() @ np.linalg.inv(self.X_PW)[:3, :3].T
+        place += np.linalg.inv(self.X_PW)[:3, 3]
+        index = np.rint((place - self.origin) / self.spacing)
+        beyond = ~((index >= 0) & (index < self.labels.shape)).all(axis=1)
+        if beyond.any():
+            raise ValueError(
+                f"{body.name}: {100 * beyond.mean():.1f} % of its tumour lie beyond "
+                "the session's grid: expected the same tumour in the same frame"
+            )
+        size = np.array(self.labels.shape)
+        left = _tumour_on_grid(
+            body, np.linalg.inv(X_WV), self.origin, self.spacing, size
+        )
+        if seen is not None:
+            self.tau[seen & (self.tau > 0)] = SOLID
+        kept = np.isin(self.labels, (CHANNEL, CAP)) | (
+            (self.labels == TUMOUR) & (self.tau != SOLID)
+        )
+        labels = np.where(left, TUMOUR, BRAIN).astype(np.uint8)
+        if (body.labels == CRITICAL).any():
+            self.critical = Boxes(np.argwhere(body.labels == CRITICAL), X_WV)
+            covered, self.to_critical = cover(
+                self.critical, self.origin, self.spacing, self.labels.shape
+            )
+            labels[covered] = CRITICAL
+        else:
+            labels[self.labels == CRITICAL] = CRITICAL
+        self.labels = np.where(kept, self.labels, labels).astype(np.uint8)
+        self.allow()
+        self.refresh()
 
     def refresh(self) -> None:
         """Makes all that follows from arrival times agree with them."""
@@ -396,6 +441,7 @@ def make_volume(
         to_critical=to_critical,
         mask_volume=body.tumour_volume if body.is_mask else None,
         notes=notes,
+        image=body.grid,
     )
 
 

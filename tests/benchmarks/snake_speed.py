@@ -33,6 +33,7 @@ from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
+from plants.snake.statics import Statics, turns_of
 from plants.snake.tension import tensions
 from systems.resection.wires.tip_reference import reference
 from tests.benchmarks.snake_mujoco import model_xml
@@ -102,8 +103,29 @@ def kinematics(seed: int) -> list[tuple[str, float, float, str]]:
             2e5,
             "poses/s",
         ),
+        ("equilibria, warm", 200 / best(equilibria()), 5e3, "postures/s"),
         ("positioning IK, one pose", best(scalar) / 200 * 1e6, 150.0, "us"),
     ]
+
+
+def equilibria() -> Callable[[], None]:
+    """What finds 200 equilibria on a circle, each from the last."""
+    bends = np.zeros((200, 7))
+    bends[:, 1] = bends[:, 5] = np.linspace(0.0, 2 * np.pi, 200)
+    bends[:, 3] = -bends[:, 1]
+    bends[:, 2::2] = 0.3, 0.25, 0.2
+    x = posture_of(bends)
+    wound = wire_lengths(x, PARAMS) - 2e-4
+    snake = Statics(PARAMS, DRIVE)
+
+    def sweep() -> None:
+        turns = turns_of(x[0])
+        for lengths in wound:
+            found = snake.equilibrium(turns, wound=lengths, force=(0.1, 0.0, 0.0))
+            assert found.converged
+            turns = found.turns
+
+    return sweep
 
 
 @dataclass

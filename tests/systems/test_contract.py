@@ -182,6 +182,7 @@ COMMANDS = {
     "Endoscope": {"shaft": HELD, "view_cone": HELD},
     "FuzzyArbiter": {"v_R": RATE},
     "GoToTarget": {"v1": RATE},
+    "GuidedTool": {"tip_velocity": RATE},
     "JointCommands": {"posture": HELD, "set_point": HELD},
     "PassiveWristEmulation": {"tool": TOOL},
     "ResectionIk": {"posture": HELD},
@@ -201,8 +202,8 @@ COMMANDS = {
 come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
-    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "ToolWrench"),
-    *("TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
+    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
+    *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     "WrenchWatch",
 }
 """Blocks that command nothing."""

@@ -2,9 +2,10 @@
 
 Directions spread over the sphere, through the tumour's centroid and its deepest
 point, are tried at coarse voxels with a short search for what is reachable; the best
-ones are tried again with a longer search.
+ones are tried again, finer and longer, in two rounds.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +16,12 @@ from plants.snake.parameters import SnakeParams
 from plants.tissue.labels import TUMOUR
 from plants.tissue.tissue import Tissue
 from plants.tissue.volume import Access, make_volume
+from systems.resection.planning.next_entry import spread
 from systems.resection.planning.reach import find_reach
 from systems.resection.planning.session import Session
 
-COARSE = 1.0e-3
-"""Edge of a voxel in m while directions are compared."""
-
-FINALISTS = 3
+LOOKS = ((1.5e-3, 0.05, 8), (1.0e-3, 0.15, 3), (1.0e-3, 0.5, 1))
+"""Rounds: edge of a voxel in m, effort of the search, and how many directions stay."""
 
 
 @dataclass
@@ -39,14 +39,6 @@ class Proposal:
     tried: NDArray[np.float64]
 
 
-def directions(count: int) -> NDArray[np.float64]:
-    """Directions spread evenly over the sphere (Fibonacci), (count, 3)."""
-    i = np.arange(count) + 0.5
-    z, a = 1 - 2 * i / count, i * np.pi * (3 - np.sqrt(5))
-    r = np.sqrt(1 - z * z)
-    return np.stack([r * np.cos(a), r * np.sin(a), z], axis=1)
-
-
 def deepest_point(tissue: Tissue) -> NDArray[np.float64]:
     """Where in P the tumour is deepest, (3,) in m."""
     inside = ndimage.distance_transform_edt(tissue.labels == TUMOUR, tissue.spacing)
@@ -61,8 +53,11 @@ def propose_access(
     count: int = 26,
     margin: float = 1.0e-3,
     seed: int = 1,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> Proposal:
     """Proposes the access through which most of the tumour can be reached.
+
+    Interrupted, it proposes the best of what it has tried.
 
     Args:
         tissue: The tissue.
@@ -71,6 +66,7 @@ def propose_access(
         count: Directions to try.
         margin: To what is critical, in m.
         seed: Of the search.
+        progress: Called with the share of what is to be tried that has been.
 
     Raises:
         ValueError: If no direction gives a channel at all.
@@ -79,29 +75,41 @@ def propose_access(
         points = [list(wish.point)]
     else:
         points = [tissue.centre().tolist(), deepest_point(tissue).tolist()]
-    tried: list[tuple[float, Access]] = []
-    reason = ""
-    for direction in directions(count):
-        for point in points:
-            access = Access(point, direction.tolist(), wish.clearance)
-            try:
-                fraction = reachable_share(tissue, access, params, margin, seed, 0.25)
-            except ValueError as error:
-                reason = str(error)
-                continue
-            tried.append((fraction, access))
-    if not tried:
+    some = [
+        Access(point, direction.tolist(), wish.clearance)
+        for direction in spread(count)
+        for point in points
+    ]
+    kept = [len(some), *(stay for _, _, stay in LOOKS)]
+    whole, done, reason = sum(kept[:-1]), 0, ""
+    table: list[tuple[float, Access]] = []
+    best: list[tuple[float, Access]] = []
+    try:
+        for spacing, effort, stay in LOOKS:
+            tried: list[tuple[float, Access]] = []
+            for access in some:
+                try:
+                    fraction = reachable_share(
+                        tissue, access, params, margin, seed, effort, spacing
+                    )
+                    tried.append((fraction, access))
+                except ValueError as error:
+                    reason = str(error)
+                done += 1
+                progress(done / whole)
+                table = table if best else tried
+            if not tried:
+                break
+            best = sorted(tried, key=lambda item: -item[0])[:stay]
+            some = [access for _, access in best]
+    except KeyboardInterrupt:
+        best = best or sorted(table, key=lambda item: -item[0])
+        if not best:
+            raise
+    if not best:
         raise ValueError(f"access: no direction gives a channel; the last: {reason}")
-    tried.sort(key=lambda item: -item[0])
-    best = max(
-        (
-            (reachable_share(tissue, access, params, margin, seed, 1.0), access)
-            for _, access in tried[:FINALISTS]
-        ),
-        key=lambda item: item[0],
-    )
-    table = np.array([[*(a.direction or []), f] for f, a in tried])
-    return Proposal(best[1], best[0], table)
+    rows = np.array([[*(a.direction or []), f] for f, a in table])
+    return Proposal(best[0][1], best[0][0], rows[np.argsort(-rows[:, 3])])
 
 
 def reachable_share(
@@ -111,8 +119,9 @@ def reachable_share(
     margin: float,
     seed: int,
     effort: float,
+    spacing: float = 1.0e-3,
 ) -> float:
     """Share of the whole tumour that can be reached, the cap counted as lost."""
-    volume = make_volume(tissue, access, params.body_radius, COARSE, margin)
+    volume = make_volume(tissue, access, params.body_radius, spacing, margin)
     reach = find_reach(Session(volume, params), seed, effort, explain=False)
     return reach.fraction * volume.tumour_volume / max(tissue.tumour_volume, 1e-12)

@@ -59,7 +59,7 @@ class PlannerParams:
 
     # Above 1, since the plan may find more than the search did.
     target: float = parameter(
-        1.005, "share of the reachable part at which it stops", above=0.0, most=1.2
+        1.004, "share of the reachable part at which it stops", above=0.0, most=1.2
     )
     pitch: float = parameter(
         2.0e-3, "of poses when carried out", "m", least=5e-4, most=6e-3

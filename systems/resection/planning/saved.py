@@ -76,6 +76,8 @@ def check_removed(session: Any) -> None:
     along = np.einsum("ij,ij->i", points - a, b - a)
     share = along / np.maximum(np.einsum("ij,ij->i", b - a, b - a), 1e-18)
     near = points - a - np.clip(share, 0.0, 1.0)[:, None] * (b - a)
-    is_near = np.einsum("ij,ij->i", near, near) <= reach**2
+    # A move is straight in the modules' angles: its tool goes along an arc.
+    arc = np.linalg.norm(b - a, axis=1) / 2
+    is_near = np.einsum("ij,ij->i", near, near) <= (reach + arc) ** 2
     if ((tau == 0) != (fresh == 0)).any() or not is_near.all():
         raise ValueError("it holds tissue as removed that the plan does not reach")

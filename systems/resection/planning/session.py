@@ -12,6 +12,7 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
 from plants.tissue.space import Space, roll_back
+from plants.tissue.tissue import Grid, Tissue
 from plants.tissue.volume import Channel, Volume
 from systems.common.archive import read_archive, sensible, write_archive
 from systems.common.parameter import check
@@ -55,6 +56,9 @@ FORMAT = 3
 STROKES = "strokes"
 """Kind of a step that is no procedure: see `strokes`."""
 
+UPDATE = "update"
+"""Kind of a step in which the tissue is taken as an image shows it now."""
+
 ACCESS = "access"
 """Kind of a step in which the access robot is set anew."""
 
@@ -69,7 +73,7 @@ class Step:
     Attributes:
         name: What it is called.
         kind: "entry", "elementary", "volume", "strokes", "home" or "access": the
-            robot withdrawn, and set anew at the end of another channel.
+            robot withdrawn, and set anew at the end of another channel, or "update".
         first: Its first visit in the route.
         last: One past its last visit.
         nodes: Nodes of the tree before it.
@@ -168,6 +172,8 @@ class Session:
         """
         if not self.steps:
             raise ValueError("there is no step to undo")
+        if self.steps[-1].kind == UPDATE:
+            raise ValueError("what was measured cannot be undone")
         step = self.steps.pop()
         self.concluded = ""
         self.volume.undo(step.first - 1)
@@ -337,20 +343,45 @@ class Session:
         if self.steps and self.steps[-1].kind != "home":
             self.go_home()
         before = self.standing()
-        visit_ = int(self.tree.size[1])
-        self.volume.bore(Channel(np.array(X_WE, float), self.volume.depth, visit_))
+        visit = int(self.tree.size[1])
+        self.volume.bore(Channel(np.array(X_WE, float), self.volume.depth, visit))
+        self._begin_at_home()
+        name = name or f"entry {1 + len(self.volume.more)}"
+        return self.record(name, ACCESS, before)
+
+    def _begin_at_home(self) -> None:
+        """Lets a tree of its own begin at home: nothing driven before is relied on."""
         self.stand()
         self.make_room()
         tree, c = self.tree, np.empty((POINTS, 3))
         place(self.body, self.home, c)
-        node = int(tree.size[0])
+        node, visit = int(tree.size[0]), int(tree.size[1])
         tree.x[node], tree.tip[node] = self.home, c[7]
         tree.parent[node], tree.depth[node] = -1, 0
-        tree.route[visit_] = node
-        tree.size[:] = node + 1, visit_ + 1, node
+        tree.route[visit] = node
+        tree.size[:] = node + 1, visit + 1, node
         enlist_all(tree)
-        name = name or f"entry {1 + len(self.volume.more)}"
-        return self.record(name, ACCESS, before)
+
+    def update(self, tissue: Tissue, seen: NDArray[np.bool_] | None = None) -> Step:
+        """Takes the tissue as an image, and a scan of the cavity, show it now.
+
+        The robot goes home, and relies on no way that it drove before: what it
+        still can do is checked against what is there.
+
+        Args:
+            tissue: Of an image taken meanwhile: the tumour that is left, and what is
+                critical, in the same frame P.
+            seen: Voxels found to be tissue, as `Volume.retarget` takes them.
+
+        Raises:
+            ValueError: If the tumour that is left lies beyond the grid.
+        """
+        if self.steps and self.steps[-1].kind != "home":
+            self.go_home()
+        self.volume.retarget(tissue, seen)
+        before = self.standing()
+        self._begin_at_home()
+        return self.record("update", UPDATE, before)
 
     def thought(self) -> "Session":
         """The same as it stands now, to be gone on with without consequence."""
@@ -428,6 +459,8 @@ class Session:
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
             "home": home,
+            "image": v.image
+            and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
             "more": [
                 {"X_WE": c.X_WE.tolist(), "depth": c.depth, "time": c.time}
                 for c in v.more
@@ -465,6 +498,8 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
         Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
         mask_volume=meta["mask_volume"],
         notes=meta["notes"],
+        image=meta.get("image")
+        and Grid(tuple(meta["image"]["sizes"]), np.array(meta["image"]["X_PI"])),
         more=[
             Channel(np.array(row["X_WE"]), row["depth"], row["time"])
             for row in meta["more"]

@@ -1,6 +1,7 @@
 """What a run leaves: whole files, of one run, whatever breaks."""
 
 from dataclasses import replace
+import gc
 import json
 import os
 from pathlib import Path
@@ -15,10 +16,12 @@ from diagrams.common.cli import main
 from diagrams.common.log import first_fault
 from diagrams.common.replay import MOST_FRAMES, start_meshcat, thinned
 from diagrams.common.results import LOCK, results, save_scenario, with_data
+from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.studies import STUDIES, build, load_scenario
 from systems.common import step_block
 from systems.common.archive import whole
+from systems.common.block import Block
 
 HOLD = """
 import sys, time
@@ -180,3 +183,17 @@ def test_a_second_diagram_compiles_nothing(monkeypatch):
 def test_a_long_replay_is_thinned():
     assert thinned(30 * 120) == 1
     assert 30 * 600 / thinned(30 * 600) <= MOST_FRAMES
+
+
+def test_a_run_that_is_dropped_leaves_little_behind():
+    def left():
+        gc.collect()
+        return sum(
+            isinstance(thing, Block) and bool(vars(thing)) for thing in gc.get_objects()
+        )
+
+    scenario, before = load_scenario("nav_one_static", duration=0.2), left()
+    result = simulate(scenario)
+    assert left() > before
+    del result
+    assert left() == before

@@ -23,7 +23,7 @@ def test_no_contact_and_the_condition_held(name):
     assert figures["min_camera_clearance"] > 0.001
     assert not figures["target_touched_before_hand_over"]
     assert figures["evasion_condition_held"] == 1.0
-    assert figures["joint_limit_time"] < 0.5  # evading, the arm may be at its limits
+    assert figures["joint_limit_time"] < 1.0  # evading, the arm may be at its limits
     assert figures["time_in_view"] > 0.99
     assert figures["reached"] or name == "hunted"
     json.dumps(figures, allow_nan=False)

@@ -1,5 +1,7 @@
 """The tools are a list: names reach them, roles wire them, three obstacles are YAML."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from diagrams.common.results import results, save_scenario
 from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.tools import gap, hands
-from diagrams.studies import load_scenario
+from diagrams.studies import check_scenario, load_scenario
 
 MORE = (
     "tools=[{name: second, role: obstacle, p_WG: [-0.08, 0.06, 0.0],"
@@ -74,3 +76,10 @@ def test_tremors_differ_and_do_not_meet_another_seed():
 def test_bad_tools_are_told(override, message):
     with pytest.raises(ScenarioError, match=message):
         load_scenario("gauze_static", [override])
+
+
+def test_without_an_obstacle_it_is_refused_clearly():
+    scenario = load_scenario("gauze_static")
+    tools = [tool for tool in scenario.tools if tool.name != "obstacle"]
+    with pytest.raises(ScenarioError, match="expected at least one of role 'obstacle'"):
+        check_scenario(replace(scenario, tools=tools))

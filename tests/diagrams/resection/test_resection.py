@@ -249,7 +249,8 @@ def test_execution_goes_on_after_being_killed(session_file, tmp_path):
             time.sleep(0.02)
         child.kill()
     assert child.returncode == -signal.SIGKILL
-    done = load_execution(executed, case.session.postures)
+    shape = case.session.volume.labels.shape
+    done = load_execution(executed, case.session.postures, shape)
     assert 0.0 < done.time < whole.metrics["execution_time"]
     rest = simulate(scenario)
     assert rest.metrics["resumed_at"] == done.time

@@ -67,7 +67,8 @@ def test_channel_and_cap():
 
 
 def test_the_proposed_access_is_the_best_of_those_tried(monkeypatch):
-    monkeypatch.setattr("systems.resection.planning.access.COARSE", 2e-3)
+    looks = ((2e-3, 0.05, 2), (2e-3, 0.25, 1))
+    monkeypatch.setattr("systems.resection.planning.access.LOOKS", looks)
     proposal = propose_access(ball_tissue(), Access(), SnakeParams(), count=1)
     assert proposal.fraction > 0.6
     assert len(proposal.tried) == 2

@@ -6,6 +6,8 @@ import pytest
 from plants.snake.parameters import SnakeParams
 from plants.tissue.labels import TUMOUR
 from plants.tissue.space import SOLID
+from plants.tissue.tissue import Tissue
+from plants.tissue.tissue_carver import Carving
 from systems.common.archive import before
 from systems.resection.planning.entry_law import (
     least_clearance,
@@ -27,7 +29,7 @@ from systems.resection.planning.procedure import (
 )
 from systems.resection.planning.reach import find_reach
 from systems.resection.planning.session import load_session
-from tests.ball import ball_session
+from tests.ball import ball_session, ball_tissue
 
 ENTRY = Procedure("entry", length=0.016, radius=0.005, pitch=1e-3, name="entry")
 
@@ -240,3 +242,45 @@ def test_further_entries_are_ranked_by_what_they_add():
     added = (reach.fraction - before) * session.volume.tumour_volume
     assert added >= 0.95 * found[0].gained
     assert bored_healthy(session.volume) == found[0].bored > 0.0
+
+
+def test_an_image_taken_meanwhile_replaces_the_first(tmp_path):
+    """The tumour has sunk by 2 mm, and a layer thought to be gone is still there."""
+    session = ball_session()
+    session.file = tmp_path / "u.session"
+    assert session.commit(ENTRY).feasible
+    volume, first = session.volume, ball_tissue()
+    X_PV = first.X_PV.copy()
+    X_PV[0, 3] += 2e-3
+    seen = volume.resected & (volume.points(volume.labels >= 0)[:, 0] > 3.5e-3).reshape(
+        volume.labels.shape
+    )
+    assert seen.any()
+    gone = volume.resected & ~seen
+    session.update(Tissue(first.labels, X_PV, "later", is_mask=True), seen)
+    assert (volume.tau[seen] == SOLID).all() and (volume.tau[gone] != SOLID).all()
+    assert (volume.labels[gone] == TUMOUR).all()
+    left = volume.points((volume.labels == TUMOUR) & (volume.tau == SOLID))
+    X_PW = volume.X_PW
+    middle = (X_PV @ [*(np.array(first.labels.shape) - 1) / 2, 1.0])[:3]
+    away = np.linalg.norm(left @ X_PW[:3, :3].T + X_PW[:3, 3] - middle, axis=1)
+    assert away.max() < 16.2e-3
+    again = load_session(session.file)
+    np.testing.assert_array_equal(again.volume.labels, volume.labels)
+    # The way in has to be made again where tissue is in it.
+    steps = len(again.steps)
+    wider = Procedure("entry", length=0.012, radius=0.009, clipped=True, name="again")
+    assert again.commit(wider).feasible
+    carving = Carving(again.volume, again.params)
+    carving.volume.tau[:] = volume.tau
+    carving.volume.refresh()
+    carving.space = carving.volume.space()
+    x = again.postures
+    for index in range(again.steps[steps].first - 1, len(x) - 1):
+        assert carving.move(10**6 + index, x[index], x[index + 1], 0.2e-3)[2] == 0
+    again.undo()
+    with pytest.raises(ValueError, match="what was measured cannot be undone"):
+        again.undo()
+    X_PV[0, 3] += 0.05
+    with pytest.raises(ValueError, match="lie beyond the session's grid"):
+        again.update(Tissue(first.labels, X_PV, "other"))
