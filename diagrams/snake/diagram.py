@@ -13,15 +13,19 @@ from plants.snake.elastic_wires import ElasticWires
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
+from systems.resection.wires.ball_location import BallLocation
 from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tip_reference import TipReference, reference
+from systems.resection.wires.tool_load import ToolLoad
 from systems.resection.wires.wire_drums import WireDrums
 from systems.resection.wires.wire_forward_actuation import WireForwardActuation
 from systems.resection.wires.wire_inverse_actuation import (
+    PAPERS,
     WireInverseActuation,
     wound_lengths,
 )
+from systems.resection.wires.wire_statics import WireStatics
 from systems.resection.wires.wire_tension import WireTension
 from systems.resection.wires.wire_watch import WireWatch
 
@@ -30,15 +34,15 @@ WIRES = (
     ("tip_reference.target", "resection_ik.target"),
     ("resection_ik.posture", "wire_inverse_actuation.posture"),
     ("wire_inverse_actuation.drums", "wire_drums.command"),
-    # The lengths impose a posture.
-    ("wire_drums.rates", "wire_forward_actuation.rates"),
     # Where the snake is, and whether a wire is slack.
     ("plant.snake_state", "snake_location.state"),
     ("wire_watch.stop", "wire_drums.stop"),
 )
-"""Signals of both wire models."""
+"""Signals of all wire models."""
 
 DRUM_WIRES = (
+    # The lengths impose a posture.
+    ("wire_drums.rates", "wire_forward_actuation.rates"),
     ("wire_drums.lengths", "wire_forward_actuation.lengths"),
     ("wire_forward_actuation.desired_state", "plant.snake_desired_state"),
     ("plant.snake_state", "wire_tension.state"),
@@ -47,6 +51,7 @@ DRUM_WIRES = (
 )
 
 ELASTIC_WIRES = (
+    ("wire_drums.rates", "wire_forward_actuation.rates"),
     ("elastic_wires.measured", "wire_forward_actuation.lengths"),
     ("elastic_wires.travel", "plant.snake_desired_state"),
     ("plant.snake_state", "elastic_wires.state"),
@@ -56,17 +61,46 @@ ELASTIC_WIRES = (
     ("elastic_wires.tension", "wire_watch.tension"),
 )
 
+STATICS_WIRES = (
+    ("wire_drums.lengths", "wire_statics.lengths"),
+    ("wire_drums.rates", "wire_statics.rates"),
+    ("tool_load.force", "wire_statics.force"),
+    ("wire_statics.desired_state", "plant.snake_desired_state"),
+    ("wire_statics.tension", "wire_watch.tension"),
+    ("wire_statics.stability", "wire_watch.stability"),
+)
+
+WIRES_OF = {
+    "drums": DRUM_WIRES,
+    "elastic": ELASTIC_WIRES,
+    "statics": STATICS_WIRES,
+}
+
 EXPORTS = {
     "tip.reference": "tip_reference.reference",
     "snake.tool": "snake_location.tool",
     "snake.posture": "snake_location.bends",
-    "snake.coupler_error": "snake_location.coupler_error",
     "ik.status": "resection_ik.status",
     "drums.lengths": "wire_drums.lengths",
     "drums.limited": "wire_drums.limited",
-    "wires.residual": "wire_forward_actuation.residual",
     "watch.alarm": "wire_watch.alarm",
     "scene_graph.query": "scene_graph.query",
+}
+
+_PAPERS = {
+    "snake.coupler_error": "snake_location.coupler_error",
+    "wires.residual": "wire_forward_actuation.residual",
+}
+EXPORTS_OF = {
+    "drums": {**_PAPERS, "wires.tension": "wire_tension.tension"},
+    "elastic": {**_PAPERS, "wires.tension": "elastic_wires.tension"},
+    "statics": {
+        "snake.balls": "snake_location.balls",
+        "snake.gaps": "snake_location.gaps",
+        "wires.tension": "wire_statics.tension",
+        "wires.stability": "wire_statics.stability",
+        "tool.force": "tool_load.force",
+    },
 }
 
 CHANNEL_CLEARANCE = 1.0e-3
@@ -81,28 +115,35 @@ def start_posture(scenario: SnakeScenario) -> list[float]:
 def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s = scenario
-    elastic = s.wires == "elastic"
+    free = s.wires == "statics"
     posture = start_posture(s)
     winding = replace(s.inverse_actuation, period=s.period)
-    if elastic:
+    if s.wires != "drums":
         winding = replace(winding, stiffness=s.drive.wire_stiffness)
-    lengths = wound_lengths(posture, winding, s.snake, s.drive)
+    core = s.core if free else PAPERS
+    lengths = wound_lengths(posture, winding, s.snake, s.drive, core)
     blocks = {
         "tip_reference": TipReference(replace(s.tip, lead=s.period)),
         "resection_ik": ResectionIk(
             replace(s.resection_ik, period=s.period), s.snake, posture
         ),
         "wire_inverse_actuation": WireInverseActuation(
-            winding, s.snake, s.drive, posture
+            winding, s.snake, s.drive, posture, core
         ),
         "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(
-            s.snake, s.drive, s.period, posture
-        ),
-        "snake_location": SnakeLocation(s.snake),
+        "snake_location": (BallLocation if free else SnakeLocation)(s.snake),
         "wire_watch": WireWatch(replace(s.watch, period=s.period)),
     }
-    if not elastic:
+    if free:
+        blocks["tool_load"] = ToolLoad(s.load)
+        blocks["wire_statics"] = WireStatics(
+            s.snake, s.drive, s.core, s.period, posture
+        )
+        return blocks
+    blocks["wire_forward_actuation"] = WireForwardActuation(
+        s.snake, s.drive, s.period, posture
+    )
+    if s.wires == "drums":
         blocks["wire_tension"] = WireTension(s.tension, s.snake)
     else:
         blocks["elastic_wires"] = ElasticWires(s.elastic, s.snake, s.drive)
@@ -130,7 +171,12 @@ def make_snake_diagram(
         builder, time_step=ELASTIC_STEP if elastic else 0.0
     )
     snake = add_snake(
-        plant, plant.world_frame(), scenario.snake, scenario.drive, elastic
+        plant,
+        plant.world_frame(),
+        scenario.snake,
+        scenario.drive,
+        elastic,
+        "spherical" if scenario.wires == "statics" else "coupled",
     )
     channel = scenario.snake.body_radius + CHANNEL_CLEARANCE
     draw_channel(plant, plant.world_body(), channel)
@@ -138,7 +184,6 @@ def make_snake_diagram(
     set_default_posture(plant, snake, start_posture(scenario))
     blocks = add_blocks(builder, make_blocks(scenario), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
-    wires = WIRES + (ELASTIC_WIRES if elastic else DRUM_WIRES)
-    tension = "elastic_wires.tension" if elastic else "wire_tension.tension"
-    exports = EXPORTS | {"wires.tension": tension}
+    wires = WIRES + WIRES_OF[scenario.wires]
+    exports = EXPORTS | EXPORTS_OF[scenario.wires]
     return finish(builder, "snake", systems, wires, exports, scenario.faults)

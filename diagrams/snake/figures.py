@@ -12,6 +12,7 @@ from plants.snake.actuation import length_range, wire_lengths
 from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import WIRES, SnakeParams
 from plants.snake.posture import posture_of
+from plants.snake.statics import turns_of
 from plants.snake.wire_path import hanging_points, tangent_points
 from systems.common.parameter import check
 
@@ -53,7 +54,7 @@ def draw_module(axes: Any, alpha: float, beta: float, params: SnakeParams) -> No
     sb = np.sin(beta)
     middle = np.array([np.cos(alpha) * sb, np.sin(alpha) * sb, np.cos(beta)])
     axes_of = (np.array([0.0, 0.0, 1.0]), middle, frames(x, params)[1][:3, 2])
-    balls = hanging_points(x, params)[:2]
+    balls = hanging_points(turns_of(x), 0.0, params)[:2]
     for w in range(WIRES):  # through the plate between the balls
         through = np.array([balls[0][2][w], balls[1][1][w]]) * MM
         axes.plot(*through.T, color=MODULE_COLORS[w], lw=2.5, alpha=0.5)

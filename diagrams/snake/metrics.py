@@ -46,17 +46,31 @@ def measure(run: Any) -> dict[str, Any]:
     before = time < (np.inf if snapped is None else snapped)
     tension = run.wires.tension.T[before]
     alarm = float(run.watch.alarm.time[-1])
-    false = alarm >= 0.0 and (snapped is None or alarm < snapped)
-    found = alarm >= 0.0 and not false
+    lost = alarm >= 0.0 and float(run.watch.alarm.module[-1]) == 0.0
+    false = not lost and alarm >= 0.0 and (snapped is None or alarm < snapped)
+    found = alarm >= 0.0 and not (false or lost)
     some = len(position) > 0
     return {
         "max_pose_error": float(position.max()) if some else None,
         "rms_pose_error": float(np.sqrt(np.mean(position**2))) if some else None,
         "max_axis_error": float(angle.max()) if some else None,
-        "max_coupler_error": float(run.snake.coupler_error.angle.max()),
+        **_balls(run, alarm if lost else None),
         "min_tension": float(tension.min()),
         "max_tension": float(tension.max()),
         "break_detection_time": alarm - snapped if found and snapped else None,
         "false_alarms": int(false),
         "refused_poses": int(np.count_nonzero(np.diff(run.ik.status.code) > 0)),
+    }
+
+
+def _balls(run: Any, buckled: float | None) -> dict[str, Any]:
+    """How far the balls of a module part, and whether the snake stayed."""
+    if run.scenario.wires != "statics":
+        return {"max_coupler_error": float(run.snake.coupler_error.angle.max())}
+    gaps = run.snake.gaps
+    return {
+        "max_split": float(gaps.split.max()),
+        "max_torsion": float(np.abs(gaps.torsion).max()),
+        "least_eigenvalue": float(run.wires.stability.least_eigenvalue.min()),
+        "buckled_at": buckled,
     }

@@ -8,9 +8,9 @@ import numpy as np
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.snake.metrics import break_time, errors, judged
 from plants.snake.actuation import wire_lengths
-from plants.snake.kinematics import centreline
 from plants.snake.parameters import MODULES, WIRES
 from plants.snake.posture import posture_of
+from plants.snake.statics import corners_of, turns_of, turns_of_angles
 
 MM = 1e3
 MODULE_COLORS = ("#d93329", "#1a8c47", "#2159cc")
@@ -28,12 +28,18 @@ def _events(run: Any, *panels: Any) -> None:
             axes.axvline(alarm, color=COLORS["accent"], lw=1.5, ls="--", label="alarm")
 
 
+def turns_in(run: Any) -> np.ndarray:
+    """R_i of the six balls in each sample, (n, 6, 3, 3)."""
+    if run.scenario.wires == "statics":
+        return turns_of_angles(run.snake.balls.q)
+    return np.array([turns_of(x) for x in posture_of(run.snake.posture.q)])
+
+
 def path(run: Any) -> Figure:
     """The snake in some postures, and its tip's path with the reference."""
     figure = new_figure(7.0, 6.0)
     axes = add_axes(figure, 1, 1, 1, projection="3d")
     time, tip = run.signals["time"], run.scenario.tip
-    x = posture_of(run.snake.posture.q)
     tool = run.snake.tool.p * MM
     reference = run.tip.reference.p * MM
     if tip.poses:
@@ -42,7 +48,8 @@ def path(run: Any) -> Figure:
         )
     else:
         shown = tip.circle.ramp + tip.circle.period * np.arange(6) / 6
-    points = centreline(x, run.scenario.snake) * MM
+    points = corners_of(turns_in(run), run.snake.posture.q[:, 0], run.scenario.snake)
+    points *= MM
     for i in np.searchsorted(time, shown[shown <= time[-1]]):
         body = points[min(i, len(points) - 1)]
         axes.plot(*body.T, color=COLORS["robot"], lw=4, alpha=0.25)
@@ -135,9 +142,48 @@ def break_closeup(run: Any) -> Figure:
     return figure
 
 
+def statics(run: Any) -> Figure:
+    """What the paper takes to be zero, and how far the snake is from being lost."""
+    figure = new_figure(7.4, 6.4)
+    time, gaps = run.signals["time"], run.snake.gaps
+    position, _ = errors(run)
+    top = add_axes(figure, 3, 1, 1)
+    top.plot(time, position * MM, color=COLORS["robot"])
+    top.set(ylabel="tip error [mm]", xlim=(0, time[-1]), ylim=(0, None))
+    force = np.linalg.norm(run.tool.force.f, axis=1)
+    if force.any():
+        right = top.twinx()
+        right.plot(time, force, color=COLORS["obstacle"], ls="--")
+        right.set_ylabel("force on the tool [N]", color=COLORS["obstacle"])
+        right.grid(False)
+    middle = add_axes(figure, 3, 1, 2, sharex=top)
+    for m in range(MODULES):
+        style = {"color": MODULE_COLORS[m], "lw": 1.2}
+        split = np.degrees(gaps.split[:, m])
+        middle.plot(time, split, label=f"split {m + 1}", **style)
+        for half, name in enumerate(("near", "far")):
+            torsion = np.degrees(gaps.torsion[:, 2 * m + half])
+            line = STYLES[1 + half]
+            label = f"torsion {m + 1} {name}"
+            middle.plot(time, torsion, label=label, ls=line, **style)
+    middle.set(ylabel="split, torsion [deg]")
+    middle.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
+    bottom = add_axes(figure, 3, 1, 3, sharex=top)
+    least = run.wires.stability.least_eigenvalue
+    bottom.plot(time, 1e3 * least, color=COLORS["robot"])
+    bottom.axhline(0.0, color="k", lw=0.8)
+    bottom.set(ylabel="least eigenvalue\n[mN m/rad]", xlabel="time [s]")
+    _events(run, top, middle, bottom)
+    if run.watch.alarm.time[-1] >= 0.0:
+        bottom.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
 def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
     figures = {"path": path(run), "errors": pose_errors(run), "wires": wires(run)}
+    if run.scenario.wires == "statics":
+        figures["statics"] = statics(run)
     snapped = break_time(run.scenario)
     if snapped is not None and snapped < run.signals["time"][-1]:
         figures["break"] = break_closeup(run)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from diagrams.common.scenario import Scenario, ScenarioError
+from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.elastic_wires import ElasticWiresParams
 from plants.snake.inverse_kinematics import tool_postures
@@ -11,12 +12,13 @@ from plants.snake.reachability import why_not
 from systems.common.parameter import parameter, part
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import TipReferenceParams, reference
+from systems.resection.wires.tool_load import ToolLoadParams
 from systems.resection.wires.wire_drums import WireDrumsParams
 from systems.resection.wires.wire_inverse_actuation import WireInverseActuationParams
 from systems.resection.wires.wire_tension import WireTensionParams
 from systems.resection.wires.wire_watch import WireWatchParams
 
-WIRE_MODELS = ("drums", "elastic")
+WIRE_MODELS = ("drums", "elastic", "statics")
 
 ELASTIC_STEP = 4e-4
 """Step in s of the elastic-wire variant: its springs are explicit. At 0.5 ms the
@@ -37,7 +39,8 @@ class SnakeScenario(Scenario):
     )
     wires: str = parameter(
         "drums",
-        "as stiff as their drums, or elastic, which can go slack and snap",
+        "as stiff as their drums; elastic, which can go slack and snap; or statics, "
+        "in which each ball turns as wires, core and load have it",
         choices=WIRE_MODELS,
     )
     snake: SnakeParams = part(SnakeParams)
@@ -48,6 +51,8 @@ class SnakeScenario(Scenario):
     drums: WireDrumsParams = part(WireDrumsParams)
     tension: WireTensionParams = part(WireTensionParams)
     elastic: ElasticWiresParams = part(ElasticWiresParams)
+    core: SnakeCoreParams = part(SnakeCoreParams)
+    load: ToolLoadParams = part(ToolLoadParams)
     watch: WireWatchParams = part(WireWatchParams)
 
 
@@ -57,6 +62,11 @@ def check(scenario: SnakeScenario) -> None:
         raise ScenarioError(
             "elastic.breaks: wires of wires='drums' cannot go slack; "
             "expected wires='elastic'"
+        )
+    if any(scenario.load.force) and scenario.wires != "statics":
+        raise ScenarioError(
+            f"load.force={scenario.load.force} N: wires={scenario.wires!r} know no "
+            "force on the tool; expected wires='statics'"
         )
     _check_reach(scenario)
 

@@ -13,6 +13,7 @@ from plants.snake.kinematics import centreline
 from plants.snake.looks import BRASS, PLATE, SWEPT
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array, posture_of
+from plants.snake.statics import turns_of
 from systems.common.parameter import check
 
 
@@ -44,7 +45,7 @@ def show_snake(meshcat: Any, x: Array, params: SnakeParams | None = None) -> Arr
     if params.tool_radius > 0.0:
         meshcat.SetObject("snake/tool", Sphere(params.tool_radius), Rgba(*SWEPT))
         meshcat.SetTransform("snake/tool", RigidTransform(points[7]))
-    draw_wires(meshcat, "snake/wires", x, params)
+    draw_wires(meshcat, "snake/wires", turns_of(x), x[0], params)
     return wire_lengths(x, params)
 
 

@@ -11,11 +11,11 @@ from diagrams.common.replay import draw_trail
 from diagrams.common.study import Study, View, cenic
 from diagrams.snake.diagram import make_snake_diagram
 from diagrams.snake.metrics import break_time, measure
-from diagrams.snake.plots import plots
+from diagrams.snake.plots import plots, turns_in
 from diagrams.snake.scenario import SnakeScenario, check
 from diagrams.snake.wire_replay import animate_wires
-from plants.snake.posture import posture_of
-from plants.snake.signals import Drums, Tensions, ToolPose
+from plants.snake.signals import Drums, Stability, Tensions, ToolForce, ToolPose
+from systems.resection.wires.ball_location import BallAngles, Gaps
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
 from systems.resection.wires.wire_drums import Limited
@@ -26,13 +26,18 @@ SIGNALS = {
     "tip.reference": ToolPose,
     "snake.tool": ToolPose,
     "snake.posture": Bends,
-    "snake.coupler_error": CouplerError,
     "ik.status": IkStatus,
     "drums.lengths": Drums,
     "drums.limited": Limited,
-    "wires.residual": Residual,
     "wires.tension": Tensions,
     "watch.alarm": Alarm,
+}
+PAPERS_SIGNALS = {"snake.coupler_error": CouplerError, "wires.residual": Residual}
+STATICS_SIGNALS = {
+    "snake.balls": BallAngles,
+    "snake.gaps": Gaps,
+    "wires.stability": Stability,
+    "tool.force": ToolForce,
 }
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
@@ -44,6 +49,12 @@ def integrator(scenario: SnakeScenario) -> SimulatorConfig:
     if scenario.wires == "elastic":
         return SimulatorConfig()
     return cenic(scenario.period)
+
+
+def signals(scenario: SnakeScenario) -> dict[str, Any]:
+    """What is logged of a scenario."""
+    free = scenario.wires == "statics"
+    return SIGNALS | (STATICS_SIGNALS if free else PAPERS_SIGNALS)
 
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
@@ -59,7 +70,8 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
         animation,
         "wires",
         time[::every],
-        posture_of(run.snake.posture.q[::every]),
+        turns_in(run)[::every],
+        run.snake.posture.q[::every, 0],
         run.scenario.snake,
         broken,
     )
@@ -82,7 +94,7 @@ STUDY = Study(
     make_diagram=lambda case: make_snake_diagram(case.scenario),
     check=check,
     measure=measure,
-    signals=lambda scenario: SIGNALS,
+    signals=signals,
     log_period=LOG_PERIOD,
     plots=plots,
     decorate=decorate,

@@ -15,18 +15,21 @@ COLORS = ((0.85, 0.20, 0.16, 1.0), (0.10, 0.55, 0.28, 1.0), (0.13, 0.35, 0.80, 1
 """Wires of modules 1, 2 and 3."""
 
 
-def wire_poses(x: np.ndarray, params: SnakeParams) -> dict[str, RigidTransform]:
+def wire_poses(
+    turns: np.ndarray, s: float, params: SnakeParams
+) -> dict[str, RigidTransform]:
     """Poses in W of all pieces of all wires, by name.
 
     Three pieces across each ball: one from either plate, one on the ball.
 
     Args:
-        x: Posture, (7,).
+        turns: R_i of the balls, (6, 3, 3).
+        s: Translation in m.
         params: The snake.
     """
     poses = {}
     R = params.ball_radius
-    for ball, (centre, P, P_far) in enumerate(hanging_points(x, params)):
+    for ball, (centre, P, P_far) in enumerate(hanging_points(turns, s, params)):
         B, C = tangent_points(centre, P, P_far, params)
         off = (B + C) / 2 - centre
         far = np.linalg.norm(off, axis=1)[:, None]
@@ -44,10 +47,12 @@ def wire_poses(x: np.ndarray, params: SnakeParams) -> dict[str, RigidTransform]:
     return poses
 
 
-def draw_wires(meshcat: Any, path: str, x: np.ndarray, params: SnakeParams) -> None:
-    """Draws the wires of one posture (7,)."""
+def draw_wires(
+    meshcat: Any, path: str, turns: np.ndarray, s: float, params: SnakeParams
+) -> None:
+    """Draws the wires over balls that turn by R_i (6, 3, 3)."""
     chord = 2 * params.ball_radius * np.sin(params.max_bend / 2)
-    for name, X_WG in wire_poses(x, params).items():
+    for name, X_WG in wire_poses(turns, s, params).items():
         length = chord if name.endswith("middle") else params.face
         color = Rgba(*COLORS[int(name[4]) // 3])
         meshcat.SetObject(f"{path}/{name}", Capsule(WIRE_RADIUS, length), color)
@@ -59,7 +64,8 @@ def animate_wires(
     animation: Any,
     path: str,
     times: np.ndarray,
-    x: np.ndarray,
+    turns: np.ndarray,
+    s: np.ndarray,
     params: SnakeParams,
     broken: Mapping[int, float] | None = None,
 ) -> None:
@@ -70,14 +76,15 @@ def animate_wires(
         animation: Its recording.
         path: Meshcat path.
         times: Key frames [s], (n,).
-        x: Postures there, (n, 7).
+        turns: R_i of the balls there, (n, 6, 3, 3).
+        s: Translation there in m, (n,).
         params: The snake.
         broken: When wires snapped [s]: they vanish.
     """
-    draw_wires(meshcat, path, x[0], params)
-    for time, posture in zip(times, x, strict=True):
+    draw_wires(meshcat, path, turns[0], s[0], params)
+    for time, balls, height in zip(times, turns, s, strict=True):
         frame = animation.frame(time)
-        for name, X_WG in wire_poses(posture, params).items():
+        for name, X_WG in wire_poses(balls, height, params).items():
             animation.SetTransform(frame, f"{path}/{name}", X_WG)
     for wire, time in (broken or {}).items():
         animation.SetProperty(0, f"{path}/wire{wire}", "visible", True)

@@ -15,6 +15,9 @@ DRUMS = WIRES * MODULES + 1
 """Motors: one a wire, and the one that slides the robot."""
 
 
+STOP = math.radians(4.0)
+"""Each joint's end stop lies this far beyond max_bend."""
+
 LEAST_GAP = math.radians(10.0)
 """Between two wires' holes in a plate."""
 

@@ -7,7 +7,7 @@ World frame W is the channel's. A posture is s, a1, b1, ..., a3, b3
 from typing import Annotated, NamedTuple
 
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
-from plants.snake.snake import POSITIONS
+from plants.snake.snake import BALL_POSITIONS, POSITIONS
 from systems.common.signal import AXES, Field, Vector
 
 type Numbers = tuple[float, ...]
@@ -85,3 +85,27 @@ class SnakeState(NamedTuple):
 
     q: Annotated[Numbers, Field("m, rad", "positions", (0.0,) * POSITIONS)]
     v: Annotated[Numbers, Field("m/s, rad/s", "velocities", (0.0,) * POSITIONS)]
+
+
+class BallState(NamedTuple):
+    """As `SnakeState`, of a snake with spherical joints: s, then Rx, Ry, Rz a ball."""
+
+    q: Annotated[Numbers, Field("m, rad", "positions", (0.0,) * BALL_POSITIONS)]
+    v: Annotated[Numbers, Field("m/s, rad/s", "velocities", (0.0,) * BALL_POSITIONS)]
+
+
+class ToolForce(NamedTuple):
+    """What acts on the tool at its origin."""
+
+    f: Annotated[Vector, Field("N", "f_T_W", (0.02, 0.0, 0.0), AXES)]
+
+
+class Stability(NamedTuple):
+    """Whether the snake stays where its wires hold it."""
+
+    least_eigenvalue: Annotated[
+        float, Field("N m/rad", "of the energy's Hessian", 0.005)
+    ]
+    lost: Annotated[
+        float, Field("1", "1 without balance or stability, or having buckled", 0.0)
+    ]

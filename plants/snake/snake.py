@@ -14,7 +14,6 @@ wires are drawn from the torsion-free pose (`wire_path`).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-import math
 from typing import Any
 
 import numpy as np
@@ -31,11 +30,15 @@ from pydrake.multibody.tree import (
 
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.looks import draw_ball, draw_carriage, draw_plate, draw_tool
-from plants.snake.parameters import MODULES, SnakeParams
+from plants.snake.parameters import MODULES, STOP, SnakeParams
+from plants.snake.statics import angles_of, turns_of
 from systems.common.parameter import check
 
 POSITIONS = 1 + 4 * MODULES
 """Generalised positions, and velocities: s, then a, b, b_far, a_far a module."""
+
+BALL_POSITIONS = 1 + 6 * MODULES
+"""With spherical joints: s, then Rx, Ry, Rz of each ball."""
 
 NEAR_ANGLES = np.array([i for k in range(MODULES) for i in (1 + 4 * k, 2 + 4 * k)])
 """Where a1, b1, a2, ... stand among them."""
@@ -45,9 +48,6 @@ NEAR = np.array([0, *NEAR_ANGLES])
 
 FAR = np.array([i for k in range(MODULES) for i in (4 + 4 * k, 3 + 4 * k)])
 """Where the coupled angles a1_far, b1_far, ... stand."""
-
-STOP = math.radians(4.0)
-"""Each joint's end stop lies this far beyond max_bend."""
 
 
 @dataclass
@@ -74,6 +74,7 @@ def add_snake(
     params: SnakeParams | None = None,
     drive: SnakeDriveParams | None = None,
     elastic: bool = False,
+    joints: str = "coupled",
 ) -> Snake:
     """Adds the snake to a plant, its channel's z axis along that of a frame.
 
@@ -85,6 +86,9 @@ def add_snake(
         drive: Masses and gains.
         elastic: Without springs on the modules' angles: wires of their own
             (`plants.snake.elastic_wires`) hold them.
+        joints: "coupled", as in the paper, or "spherical": each ball turns as its
+            servos are told (`plants.snake.statics`), which knows the weight; so
+            nothing of the snake weighs here.
 
     Returns:
         Instance, tool frame and parameters.
@@ -97,21 +101,33 @@ def add_snake(
     instance = plant.AddModelInstance("snake")
     chain = _Chain(plant, instance, params, drive, elastic)
     chain.add_carriage(frame)
-    for k in range(1, MODULES + 1):
-        chain.add_module(k)
+    if joints == "spherical":
+        for i in range(1, 2 * MODULES + 1):
+            chain.add_ball(i)
+        plant.set_gravity_enabled(instance, False)
+    elif joints == "coupled":
+        for k in range(1, MODULES + 1):
+            chain.add_module(k)
+    else:
+        raise ValueError(f"joints={joints!r}: expected 'coupled' or 'spherical'")
     return Snake(instance, chain.add_tool(), params, drive)
 
 
 def set_default_posture(plant: Any, snake: Snake, x: Sequence[float]) -> None:
     """Makes a posture the one that a plant's new contexts begin with.
 
+    Of a snake with spherical joints the balls begin alike, and without torsion.
+
     Args:
         plant: The finalized plant.
         snake: What `add_snake` added to it.
         x: The posture as s, a1, b1, ..., b3, (7,).
     """
-    q = np.zeros(POSITIONS)
-    q[NEAR], q[FAR] = x, x[1:]
+    q = np.zeros(plant.num_positions(snake.instance))
+    if len(q) == BALL_POSITIONS:
+        q[0], q[1:] = x[0], angles_of(turns_of(x))
+    else:
+        q[NEAR], q[FAR] = x, x[1:]
     plant.SetDefaultPositions(snake.instance, q)
 
 
@@ -173,6 +189,28 @@ class _Chain:
             self.plant.AddCouplerConstraint(far, near, 1.0)
             if not self.elastic:
                 self._servo(near, self.drive.kp, self.drive.kd)
+
+    def add_ball(self, i: int) -> None:
+        """A ball in two halves, one an axis, the plate beyond it, and three servos."""
+        p, d = self.params, self.drive
+        half = UnitInertia.SolidSphere(p.ball_radius)
+        for axis, name in enumerate((f"ball{i}", f"ball{i}_half", f"plate{i}")):
+            if axis < 2:
+                link = self._body(name, d.ball_mass / 2, 0.0, half)
+            else:
+                link = self._body(name, d.plate_mass, p.half_pitch, self._disc())
+            unit = [float(k == axis) for k in range(3)]
+            joint = self.plant.AddJoint(
+                RevoluteJoint(
+                    f"{'xyz'[axis]}{i}", self.end, link.body_frame(), unit, d.friction
+                )
+            )
+            self._servo(joint, d.kp, d.kd)
+            if axis == 0:
+                draw_ball(self.plant, link, p)
+            self.body, self.end = link, link.body_frame()
+        draw_plate(self.plant, self.body, p)
+        self.end = self._frame(f"plate{i}_end", self.body, 2 * p.half_pitch)
 
     def _turn(self, name: str, axis: int, body: str, is_ball: bool) -> Any:
         """One revolute joint about x or y at the end's ball centre."""

@@ -25,9 +25,8 @@ from numpy.typing import ArrayLike
 
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.parameters import MODULES, WIRES, SnakeParams
+from plants.snake.parameters import MODULES, STOP, WIRES, SnakeParams
 from plants.snake.posture import Array, bends_of, whole_postures
-from plants.snake.snake import STOP
 from plants.snake.weight import GRAVITY
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, norm, over, scaled
@@ -327,14 +326,14 @@ def _factored(H: Any, shift: float, U: Any) -> bool:
 
 
 @compiled
-def _descent(g: Any, H: Any, U: Any, step: Any) -> None:
-    """A Newton step, of a Hessian that is lifted until it is positive."""
+def _descent(g: Any, H: Any, U: Any, step: Any) -> bool:
+    """A Newton step; whether the Hessian had to be lifted to be positive."""
     shift = 0.0
     while not _factored(H, shift, U):
         shift = max(2e-3, 3 * shift)
         if not shift < 1e9:  # it has no finite value
             step[:] = 0.0
-            return
+            return True
     n = len(g)
     for i in range(n):
         total = -g[i]
@@ -346,17 +345,19 @@ def _descent(g: Any, H: Any, U: Any, step: Any) -> None:
         for k in range(i + 1, n):
             total -= U[k, i] * step[k]
         step[i] = total / U[i, i]
+    return shift > 0.0
 
 
 @compiled
 def settled(
     start: Any, pull: Any, stiffness: float, wound: Any, load: Any, s: Any, most: int
-) -> tuple[Any, Forces, float, int, bool]:
+) -> tuple[Any, Forces, float, int, bool, bool]:
     """The equilibrium that is downhill from a start: Newton's method with a search.
 
     Returns:
-        Turns, forces there, the least eigenvalue, iterations, and whether the torques
-        that are left are below `TOLERANCE`.
+        Turns, forces there, the least eigenvalue, iterations, whether the torques
+        that are left are below `TOLERANCE`, and whether the way led over a Hessian
+        that is not positive.
     """
     n = 3 * MODULES if s.coupled else TURNS
     now, new = start.copy(), start.copy()
@@ -365,7 +366,7 @@ def settled(
     delta = np.zeros(TURNS)
     energy = assembled(now, pull, stiffness, wound, load, s, here)
     has_moment = load[3] != 0.0 or load[4] != 0.0 or load[5] != 0.0
-    done = False
+    done = left_it = False
     count = 0
     for count in range(most + 1):
         _reduced(here, s, g, H)
@@ -373,7 +374,7 @@ def settled(
         done = left < TOLERANCE
         if done or count == most or not math.isfinite(left):
             break
-        _descent(g, H, U, step)
+        left_it = _descent(g, H, U, step) or left_it
         size = np.abs(step).max()
         share = 1.0 if size <= LONGEST else LONGEST / size
         slope = 0.0
@@ -402,7 +403,7 @@ def settled(
     least = math.nan
     if math.isfinite(np.abs(H).max()):
         least = np.linalg.eigvalsh(H)[0]
-    return now, here, least, count, done
+    return now, here, least, count, done, left_it
 
 
 class Equilibrium(NamedTuple):
@@ -416,6 +417,7 @@ class Equilibrium(NamedTuple):
             in balance and does not stay.
         iterations: That it took.
         converged: Whether it is in balance.
+        buckled: Whether the way there left a state that it could not stay in.
     """
 
     turns: Array
@@ -424,6 +426,7 @@ class Equilibrium(NamedTuple):
     least_eigenvalue: float
     iterations: int
     converged: bool
+    buckled: bool
 
     @property
     def stable(self) -> bool:
@@ -500,8 +503,10 @@ class Statics:
     ) -> Equilibrium:
         """The equilibrium downhill from turns; arguments as of `energy`."""
         args = self._arguments(tension, wound, force, moment)
-        now, to, least, count, done = settled(turns, *args, self.record[0], MOST)
-        return Equilibrium(now, to.L, to.T, least, count, done)
+        now, to, least, count, done, buckled = settled(
+            turns, *args, self.record[0], MOST
+        )
+        return Equilibrium(now, to.L, to.T, least, count, done, buckled)
 
     def _arguments(
         self, tension: Any, wound: Any, force: Any, moment: Any
@@ -553,3 +558,47 @@ def tool_pose(turns: Array, s: float, params: SnakeParams) -> Array:
         X[:3, 3] += 2 * params.half_pitch * X[:3, 2]
     X[:3, 3] += params.tool_offset * X[:3, 2]
     return X
+
+
+def angles_of(turns: Array) -> Array:
+    """Angles of joints Rx, Ry, Rz a ball in rad, (18,), that turn by R_i."""
+    a = np.arctan2(-turns[:, 1, 2], turns[:, 2, 2])
+    b = np.arcsin(np.clip(turns[:, 0, 2], -1.0, 1.0))
+    c = np.arctan2(-turns[:, 0, 1], turns[:, 0, 0])
+    return np.stack([a, b, c], axis=1).ravel()
+
+
+def turns_of_angles(angles: ArrayLike) -> Array:
+    """R_i (..., 6, 3, 3) of the joints' angles, (..., 18)."""
+    q = np.asarray(angles, float)
+    q = q.reshape(*q.shape[:-1], BALLS, 3)
+    ca, cb, cc = np.moveaxis(np.cos(q), -1, 0)
+    sa, sb, sc = np.moveaxis(np.sin(q), -1, 0)
+    rows = [
+        [cb * cc, -cb * sc, sb],
+        [sa * sb * cc + ca * sc, ca * cc - sa * sb * sc, -sa * cb],
+        [sa * sc - ca * sb * cc, ca * sb * sc + sa * cc, ca * cb],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def corners_of(turns: Array, s: ArrayLike, params: SnakeParams) -> Array:
+    """Six ball centres, O3 and the tool in W, as `kinematics.centreline`.
+
+    Args:
+        turns: R_i, (..., 6, 3, 3).
+        s: Translation in m, (...).
+        params: The snake.
+
+    Returns:
+        Points in m, (..., 8, 3).
+    """
+    p = np.zeros((*turns.shape[:-3], 3))
+    p[..., 2] = s
+    axes, points = np.eye(3), [p]
+    reach = 2 * params.half_pitch
+    for i in range(BALLS):
+        axes = axes @ turns[..., i, :, :]
+        points.append(points[-1] + reach * axes[..., 2])
+    points.append(points[-1] + params.tool_offset * axes[..., 2])
+    return np.stack(points, axis=-2)

@@ -12,7 +12,7 @@ import numpy as np
 
 from plants.snake.actuation import norm_rows
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
-from plants.snake.posture import Array, bends_of, whole_postures
+from plants.snake.posture import Array
 
 BALLS = 2 * MODULES
 
@@ -22,28 +22,24 @@ def wires_at(ball: int) -> range:
     return range(WIRES * (ball // 2), WIRES * MODULES)
 
 
-def hanging_points(x: Array, params: SnakeParams) -> list[tuple[Array, Array, Array]]:
+def hanging_points(
+    turns: Array, s: float, params: SnakeParams
+) -> list[tuple[Array, Array, Array]]:
     """Ball centre O, P_i and P'_i in W for each ball, in m: (3,), (n, 3), (n, 3).
 
-    From torsion-free plates, as the paper assumes them.
-
     Args:
-        x: One posture, (7,).
+        turns: R_i of the balls, (6, 3, 3); `statics.turns_of` has the paper's.
+        s: Translation in m.
         params: The snake.
     """
-    q = bends_of(whole_postures(x))
     h, d = params.half_pitch, params.face
     rows = norm_rows(params)
     # R (cos phi, sin phi, 0)
     circle = np.column_stack([rows[:, 1] / -2, rows[:, 2] / -2, 0 * rows[:, 0]])
-    centre, plate = np.array([0.0, 0.0, q[0]]), np.eye(3)
+    centre, plate = np.array([0.0, 0.0, s]), np.eye(3)
     found = []
-    for ball in range(BALLS):
-        alpha, beta = q[1 + 2 * (ball // 2)], q[2 + 2 * (ball // 2)]
-        ca, sa, cb, sb = np.cos(alpha), np.sin(alpha), np.cos(beta), np.sin(beta)
-        turn = np.array([[ca, -sa, 0], [sa, ca, 0], [0, 0, 1]])
-        bend = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
-        after = plate @ turn @ bend @ turn.T
+    for ball, turn in enumerate(turns):
+        after = plate @ turn
         own = circle[wires_at(ball).start :]
         up = np.array([0.0, 0.0, d])
         found.append(

@@ -9,8 +9,7 @@ reference postures, not equations (2) and (3).
 import numpy as np
 
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.parameters import SnakeParams
-from plants.snake.snake import STOP
+from plants.snake.parameters import STOP, SnakeParams
 
 
 def _body(name: str, p: SnakeParams, mass: float, is_ball: bool, joint: str) -> str:

@@ -44,6 +44,7 @@ DIAGRAMS: dict[str, list[str]] = {
     "nav_one_static": [],
     "nav_crowd": [],
     "snake_wire_break": [],
+    "snake_unstable": [],
     "resect_paper": ["spacing=0.001", "reach_effort=0.05"],
     "keyhole_circle": [],
 }
@@ -197,6 +198,7 @@ COMMANDS = {
     "WireDrums": {"rates": RATE, "lengths": HELD},
     "WireForwardActuation": {"desired_state": (slice(7, 14), slice(0, 7))},
     "WireInverseActuation": {"drums": HELD},
+    "WireStatics": {"desired_state": (slice(19, 38), slice(0, 19))},
 }
 """Outputs that command a motion, by block: which of their elements are rates, that must
 come to zero, and which are poses or set-points, that must come to a halt."""
@@ -204,7 +206,7 @@ OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
     *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
-    "WrenchWatch",
+    *("BallLocation", "ToolLoad", "WrenchWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}

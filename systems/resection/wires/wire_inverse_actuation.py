@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from plants.snake.actuation import wire_lengths
+from plants.snake.core import SnakeCoreParams, torques_against_core
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import REST, Drums, Posture
@@ -14,6 +15,9 @@ from plants.snake.tension import tensions
 from plants.snake.weight import GRAVITY, weight
 from systems.common.block import Block
 from systems.common.parameter import check, parameter
+
+PAPERS = SnakeCoreParams(kind="coupled")
+"""The core of the paper's snake."""
 
 
 @dataclass
@@ -47,18 +51,20 @@ def wound_lengths(
     params: WireInverseActuationParams,
     snake: SnakeParams,
     drive: SnakeDriveParams,
+    core: SnakeCoreParams = PAPERS,
 ) -> np.ndarray:
     """Drum positions of a posture x (7): wires 0 to 8 and the translation [m] (10).
 
-    They hold the snake's weight as well: what gives way under it, wires or servos,
-    is wound shorter by as much.
+    They hold the snake's weight as well, and bend its core: what gives way under it,
+    wires or servos, is wound shorter by as much.
     """
     x = np.asarray(x, float)
     load = weight(x, snake, drive, params.gravity)
     stiffness = np.array([drive.travel_kp] + [drive.kp] * (len(x) - 1))
     lifted = x - load / stiffness
     if params.stiffness > 0.0:
-        T = tensions(x[1:], -load[1:], snake, params.least_tension)
+        tau = torques_against_core(x[1:], core) - load[1:]
+        T = tensions(x[1:], tau, snake, params.least_tension)
         return np.append(wire_lengths(x, snake) - T / params.stiffness, lifted[0])
     return np.append(wire_lengths(lifted, snake), lifted[0])
 
@@ -79,12 +85,14 @@ class WireInverseActuation(Block):
         snake: SnakeParams | None = None,
         drive: SnakeDriveParams | None = None,
         posture: ArrayLike = REST,
+        core: SnakeCoreParams = PAPERS,
     ) -> None:
-        """Makes the block for a snake and its drive, starting at a posture (7)."""
+        """Makes the block for a snake, its drive and core, starting at a posture."""
         super().__init__()
         self._params = check(params or WireInverseActuationParams())
         self._snake = check(snake or SnakeParams())
         self._drive = check(drive or SnakeDriveParams())
+        self._core = core
         self._posture = self.signal_in("posture", Posture)
         self.DeclareDiscreteState(self._wound(posture))  # the last good drums
         tickets = {self._posture.ticket(), self.xd_ticket()}
@@ -93,7 +101,7 @@ class WireInverseActuation(Block):
         self.update_every(self._params.period, self._drums.Eval)
 
     def _wound(self, x: ArrayLike) -> np.ndarray:
-        return wound_lengths(x, self._params, self._snake, self._drive)
+        return wound_lengths(x, self._params, self._snake, self._drive, self._core)
 
     def _calc_drums(self, context: Any) -> np.ndarray:
         x = self._posture.Eval(context)

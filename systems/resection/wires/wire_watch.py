@@ -1,4 +1,4 @@
-"""Wire watch: notices a slack or broken wire and stops the drums."""
+"""Wire watch: stops the drums at a slack or broken wire, or a lost posture."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
@@ -6,18 +6,18 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from plants.snake.parameters import MODULES, WIRES
-from plants.snake.signals import Stopped, Tensions
+from plants.snake.signals import Stability, Stopped, Tensions
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field
+from systems.common.signal import Field, example
 from systems.common.step_block import StepBlock
 
 
 class Alarm(NamedTuple):
-    """A wire that has been slack."""
+    """A wire that has been slack, or a posture that is lost."""
 
     time: Annotated[float, Field("s", "of the alarm, -1 before", -1.0)]
-    module: Annotated[float, Field("1", "1 to 3, -1 before", -1.0)]
+    module: Annotated[float, Field("1", "1 to 3, 0 if it is lost, -1 before", -1.0)]
 
 
 @dataclass
@@ -43,11 +43,14 @@ def watch(
     stopped: Stopped,
     time: float,
     tensions: Tensions,
+    stability: Stability,
 ) -> tuple[np.ndarray, Alarm, Stopped]:
     """Slack samples in a row of each wire (9), the alarm, and whether to stop."""
     T = np.array(tensions.T)
     # A tension that is no number is not known to be enough.
     count = np.where(params.least <= T, 0.0, count + 1.0)
+    if alarm.time < 0.0 and stability.lost != 0.0:
+        alarm = Alarm(time, 0.0)
     if alarm.time < 0.0 and count.max() >= params.samples:
         alarm = Alarm(time, count.argmax() // WIRES + 1.0)
     return count, alarm, Stopped(1.0 if alarm.time >= 0.0 else 0.0)
@@ -58,9 +61,11 @@ class WireWatch(StepBlock):
 
     A wire that snaps lets the other two of its module go slack within a
     millisecond or two, and wires beyond it may follow: what can be told is the
-    module, the one nearest to the base that has a slack wire.
+    module, the one nearest to the base that has a slack wire. A posture that is lost,
+    out of balance, unstable or buckled, raises it at once.
 
     Port ``tension`` accepts the `Tensions`, as load cells at the drums measure them.
+    Port ``stability`` accepts the `Stability`; it need not be connected.
     Port ``stop`` emits whether the drums are `Stopped`, from the alarm on.
     Port ``alarm`` emits the `Alarm`.
     """
@@ -72,11 +77,12 @@ class WireWatch(StepBlock):
         self.declare_update(
             watch,
             [packed(params)],
-            {"tension": Tensions},
+            {"tension": Tensions, "stability": Stability},
             {
                 "_count": np.zeros(WIRES * MODULES),
                 "alarm": Alarm(-1.0, -1.0),
                 "stop": Stopped(0.0),
             },
             params.period,
+            defaults={"stability": example(Stability)},
         )

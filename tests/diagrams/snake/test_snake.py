@@ -138,3 +138,39 @@ def test_replay_shows_the_snake(tmp_path, screenshot):
     assert ((red > 0.4) & (green < 0.3) & (blue < 0.3)).sum() > 50  # module 1's wires
     assert ((blue > 0.4) & (red < 0.3)).sum() > 50  # module 3's wires
     assert ((red > blue + 0.15) & (green > blue + 0.1)).sum() > 300  # brass balls
+
+
+def test_free_balls_on_an_elastic_core_stay_and_leave_a_gap():
+    run = runs.run("snake_statics")
+    figures = run.metrics
+    assert figures["buckled_at"] is None and figures["false_alarms"] == 0
+    assert figures["least_eigenvalue"] > 0.005
+    assert figures["max_split"] > math.radians(1.0)
+    assert figures["min_tension"] > 0.5
+    time, tool = run.signals["time"], run.snake.tool.p
+    off = np.linalg.norm(tool - run.tip.reference.p, axis=1)
+    assert off[time < 5.0].max() < 0.2e-3 < 0.4e-3 < off[-1]
+    assert set(plots(run)) == {"path", "errors", "wires", "statics"}
+
+
+def test_wires_alone_buckle_and_motion_stops():
+    run = runs.run("snake_unstable")
+    assert run.metrics["buckled_at"] <= 0.02
+    assert run.metrics["least_eigenvalue"] < 0.0
+    assert run.metrics["max_split"] > math.radians(30.0)
+    assert run.metrics["false_alarms"] == 0
+    after = run.signals["time"] > 0.05
+    lengths = np.column_stack(run.drums.lengths)[after]
+    assert np.abs(np.diff(lengths, axis=0)).max() == 0.0
+
+
+def test_coupled_pairs_are_the_papers_snake():
+    run = simulate(load_scenario("snake_statics", ["core.kind=coupled"], 1, 2.0))
+    assert run.metrics["max_split"] < 1e-6
+    assert run.metrics["rms_pose_error"] < 0.02e-3
+    assert run.metrics["buckled_at"] is None
+
+
+def test_a_force_that_a_wire_model_does_not_know_is_refused():
+    with pytest.raises(ScenarioError, match=r"load\.force=.*expected wires='statics'"):
+        load_scenario("snake_circle", ["load.force=[0.1,0,0]"])

@@ -13,6 +13,7 @@ from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
+from plants.snake.statics import turns_of
 from plants.snake.tension import length_jacobian
 from plants.snake.wire_path import hanging_points, tangent_points, wires_at
 
@@ -106,7 +107,9 @@ def test_drawn_path_is_as_long_as_the_wires():
     for _ in range(50):
         x = random_posture(rng)
         length = np.zeros(9)
-        for ball, (centre, P, P_far) in enumerate(hanging_points(x, PARAMS)):
+        for ball, (centre, P, P_far) in enumerate(
+            hanging_points(turns_of(x), x[0], PARAMS)
+        ):
             B, C = tangent_points(centre, P, P_far, PARAMS)
             chord = np.linalg.norm(C - B, axis=1)
             direct = np.linalg.norm(P_far - P, axis=1)

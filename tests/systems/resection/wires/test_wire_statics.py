@@ -1,0 +1,78 @@
+"""Wire statics, ball location and tool load as blocks."""
+
+import numpy as np
+import pytest
+
+from plants.snake.actuation import wire_lengths
+from plants.snake.kinematics import forward
+from plants.snake.parameters import SnakeParams
+from plants.snake.posture import posture_of
+from plants.snake.signals import BallState
+from plants.snake.statics import angles_of, turns_of
+from systems.common.parameter import ParameterError
+from systems.resection.wires.ball_location import BallLocation
+from systems.resection.wires.tool_load import ToolLoad, ToolLoadParams
+from systems.resection.wires.wire_statics import WireStatics
+
+PARAMS = SnakeParams()
+X = posture_of([0.01, 0.4, 0.3, -1.2, 0.3, 2.5, 0.3])
+
+
+def fixed(lengths, force=(0.0, 0.0, 0.0)):
+    """The block at a posture's lengths, all at rest."""
+    dut = WireStatics(posture=X)
+    context = dut.CreateDefaultContext()
+    dut.GetInputPort("lengths").FixValue(context, lengths)
+    dut.GetInputPort("rates").FixValue(context, np.zeros(10))
+    dut.GetInputPort("force").FixValue(context, force)
+    return dut, context
+
+
+def test_it_follows_wires_and_force():
+    wound = np.append(wire_lengths(X, PARAMS) - 2e-4, X[0])
+    dut, context = fixed(wound)
+    location = BallLocation()
+    where = location.CreateDefaultContext()
+    tools = []
+    for f in (0.0, 0.05):
+        dut.GetInputPort("force").FixValue(context, [f, 0.0, 0.0])
+        least, lost = dut.GetOutputPort("stability").Eval(context)
+        assert least > 0.0 == lost
+        state = dut.GetOutputPort("desired_state").Eval(context)
+        location.GetInputPort("state").FixValue(where, state)
+        tools.append(location.GetOutputPort("tool").Eval(where)[:3])
+    assert np.linalg.norm(tools[0] - forward(X, PARAMS)[:3, 3]) < 5e-3
+    assert tools[1][0] - tools[0][0] > 1e-4
+
+
+def test_location_is_the_papers_for_balls_that_turn_alike():
+    dut = BallLocation()
+    context = dut.CreateDefaultContext()
+    q = np.append(X[0], angles_of(turns_of(X)))
+    state = BallState(tuple(q), (0.0,) * 19)
+    dut.GetInputPort("state").FixValue(context, np.concatenate(state))
+    X_WT = forward(X, PARAMS)
+    tool = dut.GetOutputPort("tool").Eval(context)
+    np.testing.assert_allclose(tool[:3], X_WT[:3, 3], atol=1e-14)
+    np.testing.assert_allclose(tool[3:], X_WT[:3, 2], atol=1e-14)
+    np.testing.assert_allclose(dut.GetOutputPort("gaps").Eval(context), 0, atol=1e-14)
+
+
+def test_what_is_no_number_moves_nothing():
+    dut, context = fixed([np.nan] * 10)
+    desired = dut.GetOutputPort("desired_state").Eval(context)
+    np.testing.assert_allclose(
+        desired[:19], np.append(X[0], angles_of(turns_of(X))), atol=1e-15
+    )
+    assert dut.GetOutputPort("stability").Eval(context)[1] == 1.0
+
+
+def test_load_grows_steadily():
+    dut = ToolLoad(ToolLoadParams([0.2, 0.0, -0.1], start=1.0, end=3.0))
+    context = dut.CreateDefaultContext()
+    for time, share in ((0.0, 0.0), (2.0, 0.5), (9.0, 1.0)):
+        context.SetTime(time)
+        f = dut.GetOutputPort("force").Eval(context)
+        np.testing.assert_allclose(f, share * np.array([0.2, 0.0, -0.1]))
+    with pytest.raises(ParameterError, match=r"end=1\.0 s: expected > start"):
+        ToolLoad(ToolLoadParams(start=2.0, end=1.0))
