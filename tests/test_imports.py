@@ -115,6 +115,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.common.run",
         "diagrams.learning.environments",
         "diagrams.live.session",
+        "diagrams.resection.export",
     }
     planning = "systems.resection.planning"
     assert importers(

@@ -52,6 +52,9 @@ FIRST_RATE = 10e-9
 
 FALL = 0.7
 
+ENOUGH, SEARCHES = 0.98, 4
+"""Share of the target below which a plan searches anew, and how often at most."""
+
 
 @dataclass
 class PlannerParams:
@@ -178,6 +181,11 @@ class Planner:
         library = self.library()
         plan = self.session.thought()
         self.stroke(plan, pace, fresh(library), 0)
+        for more in range(SEARCHES):
+            # Where edges of the library stay shut, others are found from here.
+            if self.share_of(plan) >= ENOUGH * self.params.target or self.spent:
+                break
+            self.stroke(plan, pace, self.searched(plan), -1 - more)
         best, least = plan, self.price(plan)
         for number in range(self.params.tightenings):
             worth = self.params.worth * (3.0 if number % 2 else 1.0)
@@ -195,6 +203,11 @@ class Planner:
             self.session.concluded = repr(self.params)
         self.session.save_if_filed()
 
+    @property
+    def spent(self) -> bool:
+        """Whether a plan has begun all strokes that it may."""
+        return self.tried >= self.params.budget
+
     def price(self, plan: Session) -> float:
         """What a plan costs: its time, and that of what it leaves, in s."""
         time = float(schedule(plan.postures, self.player)[-1])
@@ -205,7 +218,11 @@ class Planner:
         """Where strokes may begin: what the search found, or one made now."""
         if self.reach is not None:
             return new_library(self.reach.x, self.reach.parent, self.reach.nodes)
-        thought = self.session.thought()
+        return self.searched(self.session)
+
+    def searched(self, session: Session) -> Library:
+        """Edges that a search finds from how a session stands."""
+        thought = session.thought()
         nodes = int(thought.tree.size[0])
         search(thought, new_draws(self.params.seed), 0.25)
         end = int(thought.tree.size[0])
@@ -229,7 +246,7 @@ class Planner:
         wanted.reshape(-1)[self.goal] = True
         near = volume.inside <= WALL / volume.spacing
         goal = Goal(as_bits(wanted), as_bits(wanted & near))
-        draws = new_draws(1000 * params.seed + number)
+        draws = new_draws(1000 * params.seed + number % 1000)
         rate, begun = FIRST_RATE, 0
         while rate > params.least_rate * FALL:
             rate = max(rate, params.least_rate)
