@@ -208,7 +208,7 @@ def depth_error(r: Run) -> np.ndarray:
     ],
 )
 def test_depth_of_the_fulcrum_ten_seconds_after_the_start(rate, wave, guess, phase):
-    """59 of 60 such runs are within 1 mm: the page of the wrist."""
+    """30 of 30 such runs are within 1 mm: the page of the wrist."""
     motion = {"rate": rate, "wave": wave, "phase": phase}
     overrides = [f"wall_motion.{key}={value}" for key, value in motion.items()]
     overrides.append(f"first_guess={guess}")
