@@ -267,8 +267,9 @@ def test_an_execution_of_another_plan_is_refused(tmp_path):
     scenario = load_scenario(
         "resect_paper", ["spacing=0.001", f"session={file}", "reach_effort=0.05"]
     )
-    postures = prepare(scenario).session.postures
-    done = Execution(posture=5, tau=np.zeros((2, 2, 2), np.int32))
+    session = prepare(scenario).session
+    postures = session.postures
+    done = Execution(posture=5, tau=np.zeros_like(session.volume.tau, np.int32))
     save_execution(beside(file, "executed"), done, postures + 0.1)
     with pytest.raises(ScenarioError, match="is of another plan: move it away"):
         simulate(scenario)
