@@ -13,6 +13,8 @@ import sys
 
 from diagrams.campaigns.acts import answer, find_act
 
+READY = "ready"
+"""What it says once it can be asked."""
 _DIE_WITH_PARENT = 1  # PR_SET_PDEATHSIG
 
 
@@ -26,6 +28,8 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     do = find_act(act)
+    answers.write(READY + "\n")
+    answers.flush()
     for line in sys.stdin:
         answers.write(json.dumps(answer(do, json.loads(line))) + "\n")
         answers.flush()

@@ -21,6 +21,8 @@ from typing import Any
 
 _POLL = 0.2
 """How often a child is looked at [s]."""
+_START = 300.0
+"""What a process may take before it can be asked [s]: no run is to blame for that."""
 _TOLD = 2000
 """What is kept of its last words, in characters."""
 ROOT = str(Path(__file__).parents[2])
@@ -65,33 +67,44 @@ class Child:
             `figures`, `refused` or `error` as the act had it; or `died`, why the
             process is no more, and `said`, its last words.
         """
-        process = self._begin()
-        assert process.stdin and process.stdout
-        end = monotonic() + self._limits.time
-        line = b""
+        if self._process is None:
+            self._begin()
+            why, _ = self._line(_START)
+            if why is not None:
+                return self._buried(why)
+        assert self._process and self._process.stdin
         try:
-            process.stdin.write(json.dumps(job).encode() + b"\n")
-            process.stdin.flush()
-            with selectors.DefaultSelector() as ready:
-                ready.register(process.stdout, selectors.EVENT_READ)
-                while not line.endswith(b"\n"):
-                    if ready.select(_POLL):
-                        piece = os.read(process.stdout.fileno(), 1 << 16)
-                        if not piece:
-                            return self._buried("")
-                        line += piece
-                    elif monotonic() > end:
-                        return self._buried(f"no answer in {self._limits.time:g} s")
-                    elif _resident(process.pid) > self._limits.memory:
-                        gigabytes = self._limits.memory / 1e9
-                        return self._buried(f"more than {gigabytes:.3g} GB of memory")
+            self._process.stdin.write(json.dumps(job).encode() + b"\n")
+            self._process.stdin.flush()
         except BrokenPipeError:
             return self._buried("")
+        why, line = self._line(self._limits.time)
+        if why is not None:
+            return self._buried(why)
         self._done += 1
         if self._done >= self._limits.runs:
             self.close()
         told: dict[str, Any] = json.loads(line)
         return told
+
+    def _line(self, time: float) -> tuple[str | None, bytes]:
+        """A line of the process, or why there is none: "" if it is no more."""
+        assert self._process and self._process.stdout
+        end, line = monotonic() + time, b""
+        with selectors.DefaultSelector() as ready:
+            ready.register(self._process.stdout, selectors.EVENT_READ)
+            while not line.endswith(b"\n"):
+                if ready.select(_POLL):
+                    piece = os.read(self._process.stdout.fileno(), 1 << 16)
+                    if not piece:
+                        return "", line
+                    line += piece
+                elif monotonic() > end:
+                    return f"no answer in {time:g} s", line
+                elif _resident(self._process.pid) > self._limits.memory:
+                    gigabytes = self._limits.memory / 1e9
+                    return f"more than {gigabytes:.3g} GB of memory", line
+        return None, line
 
     def insist(self, job: Mapping[str, Any]) -> dict[str, Any]:
         """Does a job; one that takes its process with it is tried again."""
@@ -109,7 +122,7 @@ class Child:
             self._words.close()
         self._process, self._done = None, 0
 
-    def _begin(self) -> subprocess.Popen[bytes]:
+    def _begin(self) -> None:
         if self._process is None:
             self._words = tempfile.TemporaryFile()  # noqa: SIM115
             path = os.pathsep.join(filter(None, [ROOT, os.environ.get("PYTHONPATH")]))
@@ -123,7 +136,6 @@ class Child:
                 start_new_session=True,
                 env={**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"},
             )
-        return self._process
 
     def _buried(self, why: str) -> dict[str, Any]:
         """Ends the process and says why it did, or had to."""

@@ -8,6 +8,7 @@ import fcntl
 from pathlib import Path
 import re
 import shutil
+from time import sleep
 from typing import IO, Any
 
 import yaml
@@ -20,6 +21,9 @@ LOCK = ".run"
 
 INPUTS = "inputs"
 """Where copies of the files that a scenario names are kept, apart from results."""
+
+_PATIENCE = 20
+"""Times that a lock is tried: a process that was killed may take a second to go."""
 
 LARGEST_INPUT = 1_000_000_000
 """Of a file that a scenario names, in bytes."""
@@ -84,6 +88,16 @@ class Results:
             shutil.copyfile(source, draft)
 
 
+def _locked(stream: IO[str]) -> bool:
+    """Whether a file could be locked; if not, some time has passed."""
+    try:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        sleep(0.1)
+        return False
+    return True
+
+
 @contextmanager
 def results(folder: Path) -> Iterator[Results]:
     """Makes a folder of results, and keeps other runs out of it meanwhile.
@@ -101,13 +115,11 @@ def results(folder: Path) -> Iterator[Results]:
             f"cannot write to the output folder {str(folder)!r}: {error.strerror}"
         ) from error
     with stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        if not any(_locked(stream) for _ in range(_PATIENCE)):
             raise ScenarioError(
                 f"another run writes to {str(folder)!r}: expected a folder of its own, "
                 "see --out"
-            ) from error
+            )
         yield Results(folder, stream)
 
 

@@ -197,7 +197,7 @@ def test_splitting_finds_what_chance_does_not_and_resumes(tmp_path):
         vary={"x": {"normal": [0.0, 1.0]}},
         fail=["x > 3.5"],
         splitting=SplittingParams(
-            "x", rises=True, failure=3.5, population=40, moves=2, replicates=3
+            "x", rises=True, failure=3.5, population=30, moves=1, replicates=2
         ),
     )
     run_campaign(rare, tmp_path, workers=1)
