@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
+import gc
 import hashlib
 from itertools import islice
 import logging
@@ -59,6 +60,21 @@ def work(act: str, limits: Limits, jobs: list[Job]) -> tuple[list[Any], float]:
 
 
 @contextmanager
+def frozen() -> Iterator[None]:
+    """Keeps what is there already from being collected by another thread.
+
+    Some of Drake's objects end the process if they go in a thread that is not the
+    main one, and the cluster's threads collect garbage like any other.
+    """
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+@contextmanager
 def cluster(workers: int, scheduler: str = "") -> Iterator[Client]:
     """A cluster: one of processes on this machine, or one that exists.
 
@@ -72,6 +88,7 @@ def cluster(workers: int, scheduler: str = "") -> Iterator[Client]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if not scheduler:
         with (
+            frozen(),
             LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -90,7 +107,7 @@ def cluster(workers: int, scheduler: str = "") -> Iterator[Client]:
         raise ScenarioError(
             f"--scheduler {scheduler}: cannot be reached; expected tcp://HOST:PORT"
         ) from error
-    with client:
+    with frozen(), client:
         others = set(client.run(fingerprint).values())
         if others != {fingerprint()}:
             raise ScenarioError(

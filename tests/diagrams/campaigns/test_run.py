@@ -243,3 +243,25 @@ def test_file_cannot_name_code(tmp_path):
     file.write_text("act: crossing\nvariants: {a: {planner: 'os:getcwd'}}\n")
     with pytest.raises(ScenarioError, match="--planner alone"):
         load_campaign(str(file))
+
+
+def test_drakes_garbage_is_left_to_the_main_thread():
+    """A Meshcat that goes in another thread ends the process: a cluster must not."""
+    script = """
+import gc, threading
+from diagrams.campaigns.engine import frozen
+from diagrams.common.replay import start_meshcat
+ring = [start_meshcat()]
+ring.append(ring)
+del ring
+with frozen():
+    ring = [start_meshcat()]
+    other = threading.Thread(target=gc.collect)
+    other.start()
+    other.join()
+print("alive")
+"""
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert told.stdout.strip() == "alive"
