@@ -84,9 +84,14 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
     return figures
 
 
-def rms(values: np.ndarray) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+def rms(values: np.ndarray) -> float | None:
+    """Root of the mean square; None of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+
+
+def most(values: np.ndarray) -> float | None:
+    """The greatest; None of nothing."""
+    return float(values.max()) if len(values) else None
 
 
 def last_above(time: np.ndarray, value: np.ndarray, bound: float) -> float | None:

@@ -176,20 +176,12 @@ _UNITS = {"start": "s", "end": "s", "volume": "m3", "depth": "m", "length": "m"}
 """Of figures within figures."""
 
 
-def table(figures: dict[str, Any], meanings: bool = False) -> str:
-    """The figures as a table, lists one line an item.
-
-    Args:
-        figures: Of a run.
-        meanings: Whether to say what each is.
-    """
+def table(figures: dict[str, Any]) -> str:
+    """The figures of a run as a table, lists one line an item."""
     width = max(len(key) for key in figures)
     lines = []
     for key, value in figures.items():
         items = value if isinstance(value, list) and value else [value]
         for index, item in enumerate(items):
-            line = f"  {'' if index else key:<{width}}  {in_words(key, item)}"
-            if meanings and not index and key in FIGURES:
-                line = f"{line:<{width + 20}}  {FIGURES[key].meaning}"
-            lines.append(line)
+            lines.append(f"  {'' if index else key:<{width}}  {in_words(key, item)}")
     return "\n".join(lines)

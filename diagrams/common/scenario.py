@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import difflib
 from pathlib import Path
 
-from plants.faults.faulty_wire import Fault
+from plants.faults.fault import Fault
 from systems.common.parameter import parameter
 
 SCENARIO_FOLDERS = Path(__file__).parents[1]

@@ -5,7 +5,8 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from diagrams.common.scenario import ScenarioError, nearest
-from plants.faults.faulty_wire import Fault, FaultyWire
+from plants.faults.fault import Fault
+from plants.faults.faulty_wire import FaultyWire
 
 PLACES = {
     "force": "tool_wrench.wrench",

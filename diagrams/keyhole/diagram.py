@@ -15,7 +15,7 @@ from diagrams.gauze import diagram as gauze
 from diagrams.gauze.theatre import add_theatre
 from diagrams.keyhole.operation import KeyholeCase
 from diagrams.keyhole.scenario import KeyholeScenario
-from diagrams.snake.diagram import DRUM_WIRES, WIRES
+from diagrams.snake.diagram import DRUM_WIRES, WIRES, drum_chain
 from plants.abdomen.organ_motion import add_organ_motion, organ_trajectory
 from plants.instruments.tube import TubeParams, channel_frame
 from plants.snake.snake import Snake, add_snake, set_default_posture
@@ -28,16 +28,6 @@ from systems.keyhole.station_target import StationTarget
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask
 from systems.motion.joint_commands import JointCommands
-from systems.resection.wires.resection_ik import ResectionIk
-from systems.resection.wires.snake_location import SnakeLocation
-from systems.resection.wires.wire_drums import WireDrums
-from systems.resection.wires.wire_forward_actuation import WireForwardActuation
-from systems.resection.wires.wire_inverse_actuation import (
-    WireInverseActuation,
-    wound_lengths,
-)
-from systems.resection.wires.wire_tension import WireTension
-from systems.resection.wires.wire_watch import WireWatch
 from systems.sensing.optical_tracker import OpticalTracker
 from systems.sensing.organ_estimator import OrganEstimator
 from systems.sensing.robot_location import RobotLocation
@@ -172,10 +162,9 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
     )
     start = task.inside
     gravity = (s.R_WE.T @ [0.0, 0.0, -9.81]).tolist()
-    winding = replace(o.inverse_actuation, period=o.period, gravity=gravity)
-    lengths = wound_lengths(start, winding, snake, o.drive)
     tube_known = known_tube(s)
     blocks = {
+        **drum_chain(o, snake, start, gravity=gravity),
         "snake_load": SnakeLoad(o.snake, o.drive, s.instrument),
         "organ_tracker": OpticalTracker(s.organ_tracker, ["organ"]),
         "organ_noise": RandomSource(
@@ -188,15 +177,6 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
         "tube_location": TubeLocation(tube_known),
         "robot_location": RobotLocation(tube_known),
         "joint_commands": JointCommands(s.joints, posture.tolist(), s.arm, tube_known),
-        "resection_ik": ResectionIk(
-            replace(o.resection_ik, period=o.period), snake, start
-        ),
-        "wire_inverse_actuation": WireInverseActuation(winding, snake, o.drive, start),
-        "wire_drums": WireDrums(replace(o.drums, period=o.period), snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(snake, o.drive, o.period, start),
-        "snake_location": SnakeLocation(snake),
-        "wire_watch": WireWatch(replace(o.watch, period=o.period)),
-        "wire_tension": WireTension(o.tension, snake),
         "snake_in_organ": SnakeInOrgan(
             snake, tube, s.instrument.length + s.instrument.gap, s.R_WE
         ),

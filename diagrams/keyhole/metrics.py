@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.bedside.wrist_metrics import rms
+from diagrams.bedside.wrist_metrics import most, rms
 from diagrams.gauze.tools import OBSTACLE, in_the_way
 from diagrams.resection.metrics import outside_depth
 from plants.tissue.labels import CRITICAL
-from systems.keyhole.phases import REASONS, Phases, Reason
+from systems.keyhole.phases import Phases, Reason
 
+REASON = {reason.value: reason.text for reason in Reason}
 AFTER = 3.0
 """Figures of force and fulcrum that end in `_3s` begin here, in s."""
 
@@ -39,7 +40,7 @@ def log_of_phases(run: Any) -> list[dict[str, Any]]:
         {
             "phase": Phases(round(code[i])).name.lower(),
             "start": float(time[i]),
-            "reason": REASONS[Reason(round(reason[i]))],
+            "reason": REASON[round(reason[i])],
         }
         for i in first
     ]
@@ -60,6 +61,11 @@ def withdrawals(run: Any) -> list[float]:
     return found
 
 
+def share(flags: np.ndarray) -> float | None:
+    """Of the time that something holds; None of no time."""
+    return float(flags.mean()) if len(flags) else None
+
+
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     time, late = run.signals["time"], run.signals["time"] >= AFTER
@@ -73,24 +79,20 @@ def measure(run: Any) -> dict[str, Any]:
     drawn = withdrawals(run)
     figures: dict[str, Any] = {
         "rms_tool_error": rms(errors),
-        "max_tool_error": float(errors.max(initial=0.0)),
+        "max_tool_error": most(errors),
         "time_at_work": float(at_work.mean() * time[-1]),
         "rms_lateral_force": rms(force[late]),
-        "max_lateral_force_3s": float(force[late].max(initial=0.0)),
+        "max_lateral_force_3s": most(force[late]),
         "max_lateral_force": float(force.max()),
         "rms_fulcrum_error": rms(off[late]),
-        "max_fulcrum_error_3s": float(off[late].max(initial=0.0)),
+        "max_fulcrum_error_3s": most(off[late]),
         "rms_organ_error": rms(organ[at_work]),
-        "max_organ_error": float(organ[at_work].max(initial=0.0)),
+        "max_organ_error": most(organ[at_work]),
         "max_coupler_error": float(run.snake.coupler_error.angle.max()),
         "gate_opened": gate[0] if gate else None,
         "withdrawal_time": max(drawn) if drawn else None,
-        "ik_refused": float((run.ik.status.code[at_work] != 0).mean())
-        if any(at_work)
-        else 0.0,
-        "drums_limited": float((run.drums.limited.code[at_work] != 0).mean())
-        if any(at_work)
-        else 0.0,
+        "ik_refused": share(run.ik.status.code[at_work] != 0),
+        "drums_limited": share(run.drums.limited.code[at_work] != 0),
         "estimates_refused": int(run.wrist.fulcrum.refused[-1]),
         "jumps_followed": int(run.wrist.fulcrum.jumps[-1]),
         "stops": [one for one in phases if one["phase"] == "stopped"],

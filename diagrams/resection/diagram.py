@@ -9,21 +9,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.resection.operation import Operation
-from diagrams.snake.diagram import DRUM_WIRES, WIRES
+from diagrams.snake.diagram import DRUM_WIRES, WIRES, drum_chain
 from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
 from plants.tissue.tissue_carver import Carving, TissueCarver
 from systems.resection.wires.procedure_player import ProcedurePlayer
-from systems.resection.wires.resection_ik import ResectionIk
-from systems.resection.wires.snake_location import SnakeLocation
-from systems.resection.wires.wire_drums import WireDrums
-from systems.resection.wires.wire_forward_actuation import WireForwardActuation
-from systems.resection.wires.wire_inverse_actuation import (
-    WireInverseActuation,
-    wound_lengths,
-)
-from systems.resection.wires.wire_tension import WireTension
-from systems.resection.wires.wire_watch import WireWatch
 
 RESECTION_WIRES = (
     ("procedure_player.target", "resection_ik.target"),
@@ -55,9 +45,8 @@ def make_blocks(case: Operation) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, postures, done = case.scenario, case.session.postures, case.done
     start = postures[done.posture].tolist()
-    winding = replace(s.inverse_actuation, period=s.period)
-    lengths = wound_lengths(start, winding, s.snake, s.drive)
     return {
+        **drum_chain(s, s.snake, start),
         "procedure_player": ProcedurePlayer(
             replace(s.player, lead=s.period),
             s.snake,
@@ -66,19 +55,6 @@ def make_blocks(case: Operation) -> dict[str, Any]:
             case.waits,
             case.session.entries,
         ),
-        "resection_ik": ResectionIk(
-            replace(s.resection_ik, period=s.period), s.snake, start
-        ),
-        "wire_inverse_actuation": WireInverseActuation(
-            winding, s.snake, s.drive, start
-        ),
-        "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "wire_forward_actuation": WireForwardActuation(
-            s.snake, s.drive, s.period, start
-        ),
-        "snake_location": SnakeLocation(s.snake),
-        "wire_watch": WireWatch(replace(s.watch, period=s.period)),
-        "wire_tension": WireTension(s.tension, s.snake),
         "tissue_carver": TissueCarver(
             replace(s.carver, period=s.period),
             s.snake,

@@ -9,9 +9,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.snake.scenario import ELASTIC_STEP, SnakeScenario
+from plants.snake.core import SnakeCoreParams
 from plants.snake.elastic_wires import ElasticWires
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.looks import draw_channel
+from plants.snake.parameters import SnakeParams
 from plants.snake.snake import add_snake, set_default_posture
 from systems.resection.wires.ball_location import BallLocation
 from systems.resection.wires.resection_ik import ResectionIk
@@ -112,42 +114,77 @@ def start_posture(scenario: SnakeScenario) -> list[float]:
     return tool_postures(*reference(scenario.tip, 0.0), scenario.snake).x.tolist()
 
 
-def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
-    """The blocks of the diagram, by the names that the wires use."""
-    s = scenario
-    free = s.wires == "statics"
-    posture = start_posture(s)
-    winding = replace(s.inverse_actuation, period=s.period)
-    if s.wires != "drums":
-        winding = replace(winding, stiffness=s.drive.wire_stiffness)
-    core = s.core if free else PAPERS
-    lengths = wound_lengths(posture, winding, s.snake, s.drive, core)
-    blocks = {
-        "tip_reference": TipReference(replace(s.tip, lead=s.period)),
+def wire_chain(
+    robot: Any,
+    snake: SnakeParams,
+    posture: list[float],
+    core: SnakeCoreParams = PAPERS,
+    **winding: Any,
+) -> dict[str, Any]:
+    """The blocks from a tool's pose to the drums, whatever the wires are.
+
+    Args:
+        robot: Has the parameters of each, `drive` and `period`.
+        snake: The robot's geometry.
+        posture: Where it starts, (7,).
+        core: What stands between the balls.
+        **winding: Parameters of the winding that are not the robot's.
+    """
+    wound = replace(robot.inverse_actuation, period=robot.period, **winding)
+    lengths = wound_lengths(posture, wound, snake, robot.drive, core)
+    return {
         "resection_ik": ResectionIk(
-            replace(s.resection_ik, period=s.period), s.snake, posture
+            replace(robot.resection_ik, period=robot.period), snake, posture
         ),
         "wire_inverse_actuation": WireInverseActuation(
-            winding, s.snake, s.drive, posture, core
+            wound, snake, robot.drive, posture, core
         ),
-        "wire_drums": WireDrums(replace(s.drums, period=s.period), s.snake, lengths),
-        "snake_location": (BallLocation if free else SnakeLocation)(s.snake),
-        "wire_watch": WireWatch(replace(s.watch, period=s.period)),
+        "wire_drums": WireDrums(
+            replace(robot.drums, period=robot.period), snake, lengths
+        ),
+        "snake_location": SnakeLocation(snake),
+        "wire_watch": WireWatch(replace(robot.watch, period=robot.period)),
     }
-    if free:
-        blocks["tool_load"] = ToolLoad(s.load)
-        blocks["wire_statics"] = WireStatics(
-            s.snake, s.drive, s.core, s.period, posture
-        )
-        return blocks
-    blocks["wire_forward_actuation"] = WireForwardActuation(
-        s.snake, s.drive, s.period, posture
-    )
+
+
+def drum_chain(
+    robot: Any, snake: SnakeParams, posture: list[float], **winding: Any
+) -> dict[str, Any]:
+    """As `wire_chain`, and what stiff wires impose: the blocks of `DRUM_WIRES`."""
+    return {
+        **wire_chain(robot, snake, posture, **winding),
+        "wire_forward_actuation": WireForwardActuation(
+            snake, robot.drive, robot.period, posture
+        ),
+        "wire_tension": WireTension(robot.tension, snake),
+    }
+
+
+def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
+    """The blocks of the diagram, by the names that the wires use."""
+    s, posture = scenario, start_posture(scenario)
+    blocks: dict[str, Any] = {
+        "tip_reference": TipReference(replace(s.tip, lead=s.period))
+    }
     if s.wires == "drums":
-        blocks["wire_tension"] = WireTension(s.tension, s.snake)
-    else:
-        blocks["elastic_wires"] = ElasticWires(s.elastic, s.snake, s.drive)
-    return blocks
+        return blocks | drum_chain(s, s.snake, posture)
+    stiffness = s.drive.wire_stiffness
+    if s.wires == "elastic":
+        return {
+            **blocks,
+            **wire_chain(s, s.snake, posture, stiffness=stiffness),
+            "wire_forward_actuation": WireForwardActuation(
+                s.snake, s.drive, s.period, posture
+            ),
+            "elastic_wires": ElasticWires(s.elastic, s.snake, s.drive),
+        }
+    return {
+        **blocks,
+        **wire_chain(s, s.snake, posture, s.core, stiffness=stiffness),
+        "snake_location": BallLocation(s.snake),
+        "tool_load": ToolLoad(s.load),
+        "wire_statics": WireStatics(s.snake, s.drive, s.core, s.period, posture),
+    }
 
 
 def make_snake_diagram(

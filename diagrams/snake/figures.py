@@ -9,10 +9,10 @@ from scipy.ndimage import distance_transform_edt
 from diagrams.common.plots import COLORS, add_axes, new_figure
 from diagrams.snake.plots import MM, MODULE_COLORS
 from plants.snake.actuation import length_range, wire_lengths
+from plants.snake.balls import turns_of
 from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import WIRES, SnakeParams
 from plants.snake.posture import posture_of
-from plants.snake.statics import turns_of
 from plants.snake.wire_path import hanging_points, tangent_points
 from systems.common.parameter import check
 

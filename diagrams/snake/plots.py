@@ -8,9 +8,9 @@ import numpy as np
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.snake.metrics import break_time, errors, judged
 from plants.snake.actuation import wire_lengths
+from plants.snake.balls import corners_of, turns_of, turns_of_angles
 from plants.snake.parameters import MODULES, WIRES
 from plants.snake.posture import posture_of
-from plants.snake.statics import corners_of, turns_of, turns_of_angles
 
 MM = 1e3
 MODULE_COLORS = ("#d93329", "#1a8c47", "#2159cc")

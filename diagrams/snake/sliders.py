@@ -9,11 +9,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from diagrams.snake.wire_replay import draw_wires
 from plants.snake.actuation import wire_lengths
+from plants.snake.balls import turns_of
 from plants.snake.kinematics import centreline
 from plants.snake.looks import BRASS, PLATE, SWEPT
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array, posture_of
-from plants.snake.statics import turns_of
 from systems.common.parameter import check
 
 

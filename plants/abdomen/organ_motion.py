@@ -12,7 +12,7 @@ import numpy as np
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial, StackedTrajectory
 
-from plants.abdomen.wall_motion import WallMotionParams, wave
+from plants.abdomen.wall_motion import WallMotionParams
 from plants.surgeon.recording import load_recording
 from systems.common.parameter import check, parameter
 
@@ -46,12 +46,8 @@ class OrganMotionParams:
         thrown = wall.irregular.coughing(time) * np.array(self.cough)
         if self.recording:
             return thrown + _recorded(self.recording, time)
-        phase, depth = wall.irregular.breath(time, wall.rate)
-        g = wave(wall.wave, phase + wall.phase - self.lag)
-        whole: np.ndarray = thrown + np.array(self.breathing) * (
-            depth * (g + 1.0) - 1.0 if wall.irregular.disturbed else g
-        )
-        return whole
+        breath: np.ndarray = wall.excursion(time, self.lag) * np.array(self.breathing)
+        return thrown + breath
 
 
 _load = lru_cache(maxsize=4)(load_recording)

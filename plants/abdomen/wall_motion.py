@@ -78,15 +78,19 @@ class WallMotionParams:
         coughs = self.cough if self.irregular.coughs else []
         return not any((*self.breathing, *self.step, *self.rise, *coughs))
 
-    def displacement(self, time: float) -> list[float]:
-        """Where the wall is told to be, from its rest, in m (3)."""
-        phase, depth = self.irregular.breath(time, self.rate)
-        g = wave(self.wave, phase + self.phase)
-        if self.irregular.disturbed:  # a deeper breath ends where all do
-            g = depth * (g + 1.0) - 1.0
+    def excursion(self, time: float, lag: float = 0.0) -> float:
+        """The patient's breath in [-1, 1], as it is `lag` breaths behind the wall's."""
         if self.curve:
             times, curve = load_curve(self.curve)
-            g = float(np.interp(time % times[-1], times, curve))
+            return float(np.interp((time - lag / self.rate) % times[-1], times, curve))
+        phase, depth = self.irregular.breath(time, self.rate)
+        g = wave(self.wave, phase + self.phase - lag)
+        # A deeper breath ends where all do.
+        return depth * (g + 1.0) - 1.0 if self.irregular.disturbed else g
+
+    def displacement(self, time: float) -> list[float]:
+        """Where the wall is told to be, from its rest, in m (3)."""
+        g = self.excursion(time)
         thrown = self.irregular.coughing(time)
         jump = 1.0 if any(self.step) and time >= self.step_time else 0.0
         r = self.risen(time)

@@ -1,13 +1,13 @@
 """A wire that carries a signal wrongly for a while: sensors fail, an arm is slow."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from plants.faults.fault import Fault
 from systems.common.block import Block
-from systems.common.parameter import check, parameter
+from systems.common.parameter import check
 from systems.common.signal import view
 from systems.common.signals import TrackedShaft, Wrench
 from systems.common.step_block import length
@@ -45,7 +45,7 @@ def _slow(now: np.ndarray, before: np.ndarray, size: float, period: float) -> No
     now[:] = before + np.clip(now - before, -size * period, size * period)
 
 
-KINDS: dict[str, Breaks] = {
+BREAKS: dict[str, Breaks] = {
     "force_stuck": _stuck,
     "force_flipped": _flipped,
     "force_bias": _biased,
@@ -55,18 +55,7 @@ KINDS: dict[str, Breaks] = {
     "tension_nan": _nan,
     "arm_slow": _slow,
 }
-"""What can fail. Sizes: N along x in W of `force_bias` (of one sample: a spike), s that
-a frame is stamped too late, rad/s of the slow arm's joints; the others have none."""
-
-
-@dataclass
-class Fault:
-    """Something that fails in the world for a while."""
-
-    kind: str = parameter("force_stuck", "what fails", choices=tuple(KINDS))
-    start: float = parameter(0.0, "from when", "s", least=0.0, most=1e5)
-    duration: float = parameter(1.0, "for how long", "s", above=0.0, most=1e5)
-    size: float = parameter(0.0, "how much, in the kind's unit", least=-1e8, most=1e8)
+"""How each kind of fault spoils a signal."""
 
 
 class FaultyWire(Block):
@@ -90,7 +79,7 @@ class FaultyWire(Block):
         super().__init__()
         self._fault = fault or Fault()
         check(self._fault, "faults")
-        self._breaks, self._period = KINDS[self._fault.kind], period
+        self._breaks, self._period = BREAKS[self._fault.kind], period
         size = length(signal)
         if isinstance(signal, int):
             self._whole = self.vector_in("whole", [0.0] * size)

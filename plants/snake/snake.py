@@ -28,10 +28,10 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
+from plants.snake.balls import angles_of, turns_of
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.looks import draw_ball, draw_carriage, draw_plate, draw_tool
 from plants.snake.parameters import MODULES, STOP, SnakeParams
-from plants.snake.statics import angles_of, turns_of
 from systems.common.parameter import check
 
 POSITIONS = 1 + 4 * MODULES

@@ -5,12 +5,11 @@ of a tool that always comes for it, as long as the robot can evade faster than i
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
+from plants.surgeon.led_tool import DEEP, STILL, LedTool, Tip, now_at
 from plants.surgeon.surgeon_tool import SurgeonToolParams
-from systems.common.compiled import compiled, packed
+from systems.common.compiled import compiled
 from systems.common.geometry import (
     along,
     closest_on_segment,
@@ -20,14 +19,9 @@ from systems.common.geometry import (
     unit,
     xyz,
 )
-from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import Vector, vector
-from systems.common.signals import RobotTool, Shaft, Velocity, finite_tool
-from systems.common.step_block import StepBlock, wired
-
-_DEEP = 0.02
-"""Least depth of the chasing tip below its fulcrum, m."""
-_STILL = (0.0, 0.0, 0.0)
+from systems.common.parameter import Rules, parameter
+from systems.common.signal import Vector
+from systems.common.signals import RobotTool, Velocity, finite_tool
 
 
 @dataclass
@@ -48,13 +42,6 @@ class Hunt:
         yield self.start <= self.end, "end", f">= start, {self.start} s"
 
 
-class Tip(NamedTuple):
-    """Place of the tip at the last reaction, in m, and the time of it in s."""
-
-    p: Vector
-    time: float
-
-
 @compiled
 def pursue(params: Any, g_o: Vector, tip: Vector, robot: RobotTool) -> Vector:
     """Velocity of the chasing tip, m/s: M_O goes for M_R.
@@ -71,8 +58,8 @@ def pursue(params: Any, g_o: Vector, tip: Vector, robot: RobotTool) -> Vector:
     ahead = along(tip, params.period, v)
     now, then = closest_on_segment(g, g_o, tip)[1], closest_on_segment(g, g_o, ahead)[1]
     too_near = then < params.from_fulcrum and then < now
-    if too_near or ahead[2] > g_o[2] - _DEEP:
-        return _STILL
+    if too_near or ahead[2] > g_o[2] - DEEP:
+        return STILL
     return v
 
 
@@ -80,19 +67,13 @@ def pursue(params: Any, g_o: Vector, tip: Vector, robot: RobotTool) -> Vector:
 def _react(
     params: Any, last: Tip, going: Velocity, time: float, robot: RobotTool
 ) -> tuple[Tip, Velocity]:
-    tip, v = along(last.p, time - last.time, going.v), _STILL
+    tip, v = now_at(last, going, time), STILL
     if params.start <= time < params.end and finite_tool(robot):
         v = pursue(params, xyz(params.p_WG, 0), tip, robot)
     return Tip(tip, time), Velocity(v)
 
 
-@compiled
-def _shaft(params: Any, last: Tip, going: Velocity, time: float) -> tuple[Shaft]:
-    tip = along(last.p, time - last.time, going.v)
-    return (Shaft(tip, unit(sub(tip, params.p_WG))),)
-
-
-class HuntingTool(StepBlock):
+class HuntingTool(LedTool):
     """A tool in the surgeon's hand that chases the robot's shaft, through its fulcrum.
 
     Port ``robot_tool`` accepts the `RobotTool`.
@@ -113,21 +94,5 @@ class HuntingTool(StepBlock):
             ParameterError: If a parameter is out of range.
         """
         super().__init__()
-        tool, hunt = tool or SurgeonToolParams(), hunt or Hunt(speed=0.02)
-        check(tool)
-        check(hunt)
-        self._constants = packed(hunt, p_WG=vector(tool.p_WG))
-        start = {
-            "_tip": Tip(vector(tool.points[0]), 0.0),
-            "tip_velocity": Velocity(_STILL),
-        }
-        self.declare_update(
-            _react, [self._constants], {"robot_tool": RobotTool}, start, hunt.period
-        )
-        self._place = wired(_shaft, 1, [Tip, Velocity], [], [Shaft], True)
-        moving = {self.xd_ticket(), self.time_ticket()}
-        self.signal_out("shaft", Shaft, self._calc_shaft, moving)
-
-    def _calc_shaft(self, context: Any) -> np.ndarray:
-        groups = [context.get_discrete_state(group).value() for group in range(2)]
-        return self._place(self._constants, *groups, context.get_time())
+        hunt = hunt or Hunt(speed=0.02)
+        self.lead(_react, tool or SurgeonToolParams(), hunt, {"robot_tool": RobotTool})

@@ -13,45 +13,33 @@ from pydrake.math import RigidTransform
 
 from plants.snake.inverse_kernels import REACHED
 from plants.snake.inverse_kinematics import tool_posture
-from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
-from plants.snake.signals import Posture, ToolPose
+from plants.snake.signals import Posture, ToolPose, ToolTarget
+from plants.snake.tool_target import seen_from, target_of
 from systems.common.block import Block
 from systems.common.compiled import compiled
-from systems.common.signal import size, view
+from systems.common.geometry import Pose, along, column
+from systems.common.signal import size, vector, view, writer
 from systems.common.signals import MovingPoint
 
 Floats = np.ndarray
+write_target = writer(ToolTarget)
 
 
 @compiled
 def in_organ(
     x: Floats,
     h: float,
-    offset: float,
+    tool: float,
     R_WM: Floats,
     p_WM: Floats,
     channel: float,
-    R_WE: Floats,
-    p_WE: Floats,
+    E: Pose,
 ) -> Floats:
-    """Tool, its axis and the intermediate axis in E, (9,), of a posture x in C."""
-    c = np.empty((POINTS, 3))
-    corners(x, h, offset, c)
-    n, n_I = link_axis(c, 5, h), link_axis(c, 3, h)
-    out = np.zeros(9)
-    for i in range(3):
-        for j in range(3):
-            place = p_WM[j] + channel * R_WM[j, 2] - p_WE[j]
-            axis = other = 0.0
-            for k in range(3):
-                place += R_WM[j, k] * c[POINTS - 1, k]
-                axis += R_WM[j, k] * n[k]
-                other += R_WM[j, k] * n_I[k]
-            out[i] += R_WE[j, i] * place
-            out[3 + i] += R_WE[j, i] * axis
-            out[6 + i] += R_WE[j, i] * other
-    return out
+    """The elements of the `ToolTarget` in E of a posture x (7,) in C."""
+    z = column(R_WM, 2)
+    C = Pose(along(p_WM, channel, z), column(R_WM, 0), column(R_WM, 1), z)
+    return write_target(seen_from(target_of(x, h, tool), C, E))
 
 
 class SnakeInOrgan(Block):
@@ -85,7 +73,7 @@ class SnakeInOrgan(Block):
         """
         super().__init__()
         self._snake, self._body, self._channel = snake, tube, channel
-        self._R_WE = R_WE
+        self._axes = tuple(vector(axis) for axis in R_WE.T)
         self._length = 3 * snake.straight_module + snake.tool_offset
         self._posture = self.signal_in("posture", Posture)
         self._poses = self.DeclareAbstractInputPort(
@@ -106,7 +94,7 @@ class SnakeInOrgan(Block):
     def _calc_target(self, context: Any) -> Floats:
         """Tool, its axis and the intermediate axis in E, (9,)."""
         X_WM = self._poses.Eval(context)[self._body]
-        entry = view(MovingPoint, self._entry.Eval(context)).p.copy()
+        entry = vector(view(MovingPoint, self._entry.Eval(context)).p)
         target: Floats = in_organ(
             self._posture.Eval(context),
             self._snake.half_pitch,
@@ -114,19 +102,19 @@ class SnakeInOrgan(Block):
             X_WM.rotation().matrix(),
             X_WM.translation(),
             self._channel,
-            self._R_WE,
-            entry,
+            Pose(entry, *self._axes),
         )
         return target
 
     def _calc_posture(self, context: Any) -> Floats:
         target = self._target.Eval(context)
-        if target[2] > -self._snake.tool_radius:
+        depth = view(ToolTarget, target).p[2]
+        if depth > -self._snake.tool_radius:
             x, status = tool_posture(target, self._snake)
             if status == REACHED:
                 return np.array(x)
         # Before the organ nothing is touched: straight, the tool at its depth.
-        return np.array([target[2] - self._length, *np.zeros(6)])
+        return np.array([depth - self._length, *np.zeros(6)])
 
     def _calc_tool(self, context: Any) -> Floats:
         tool: Floats = self._target.Eval(context)[: size(ToolPose)]

@@ -111,9 +111,11 @@ def check_arrays(arrays: Mapping[str, Any], expected: Arrays) -> None:
     for name, (kind, shape) in expected.items():
         array = arrays[name]
         told = f"{name} is {array.dtype.str[1:]} {array.shape}"
+        if array.ndim != len(shape):
+            raise ValueError(f"{told}, expected {kind} {shape}")
         wanted = tuple(
             lengths.setdefault(length, found) if isinstance(length, str) else length
-            for length, found in zip(shape, array.shape, strict=False)
+            for length, found in zip(shape, array.shape, strict=True)
         )
         if array.dtype.str[1:] != kind or array.shape != wanted:
             raise ValueError(f"{told}, expected {kind} {wanted}")

@@ -40,6 +40,12 @@ def row_of(rows: np.ndarray, i: int) -> Vector:
 
 
 @compiled
+def column(matrix: np.ndarray, i: int) -> Vector:
+    """The i-th column of an array (3, n)."""
+    return matrix[0, i], matrix[1, i], matrix[2, i]
+
+
+@compiled
 def set_row(rows: np.ndarray, i: int, v: Vector) -> None:
     """Writes the i-th row of an array (n, 3)."""
     rows[i, 0], rows[i, 1], rows[i, 2] = v
@@ -280,3 +286,32 @@ def shaft_point_velocity(fraction: float, u: Numbers, v_tip: Numbers) -> Vector:
     """
     slide = (1.0 - fraction) * dot(u, v_tip)
     return along(scaled(fraction, v_tip), slide, u)
+
+
+class Pose(NamedTuple):
+    """A frame in W: its origin in m and its axes."""
+
+    p: Vector
+    x: Vector
+    y: Vector
+    z: Vector
+
+
+@compiled
+def pose_of(p: Numbers, x: Numbers, z: Numbers) -> Pose:
+    """The frame at p with the axis z, and x as far as it lies across that."""
+    w = unit(z)
+    u = unit(across(x, w))
+    return Pose(xyz(p, 0), u, cross(w, u), w)
+
+
+@compiled
+def outwards(X: Pose, v: Numbers) -> Vector:
+    """A direction given in a frame, in W."""
+    return along(along(scaled(v[0], X.x), v[1], X.y), v[2], X.z)
+
+
+@compiled
+def inwards(X: Pose, v: Numbers) -> Vector:
+    """A direction given in W, in a frame."""
+    return dot(X.x, v), dot(X.y, v), dot(X.z, v)

@@ -71,7 +71,7 @@ def placed(frame: tuple[Vector, Vector, Vector, Vector], p: Vector) -> Vector:
 @compiled
 def walk(
     arm: Any, q: Numbers, axes: np.ndarray, origins: np.ndarray
-) -> tuple[Vector, Vector, Vector]:
+) -> tuple[Vector, Vector, Vector, Vector]:
     """Walks the chain at a posture.
 
     Args:
@@ -81,7 +81,8 @@ def walk(
         origins: Filled with points on them (n x 3) [m].
 
     Returns:
-        The tip p_WT [m], the shaft's direction u_WT, and the load's centre of mass.
+        The tip p_WT [m], the axes x and z of its frame, z along the shaft, and the
+        load's centre of mass.
     """
     zero = (0.0, 0.0, 0.0)
     frame = (zero, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -96,28 +97,23 @@ def walk(
         moved = along(p, 1.0, turned(sub(o, p), a, c, s))
         frame = (moved, turned(x, a, c, s), turned(y, a, c, s), turned(z, a, c, s))
     tip = placed(frame, xyz(arm.tip, 0))
+    x = sub(placed(frame, xyz(arm.across, 0)), frame[0])
     shaft = sub(placed(frame, xyz(arm.shaft, 0)), frame[0])
-    return tip, shaft, placed(frame, xyz(arm.centre, 0))
+    return tip, x, shaft, placed(frame, xyz(arm.centre, 0))
 
 
 @compiled
 def tip_frame(arm: Any, q: Numbers) -> tuple[Vector, Vector, Vector]:
     """p_WT of the tip at a posture (n) [rad], and the axes x and z of its frame T."""
-    tip, x, z = xyz(arm.tip, 0), xyz(arm.across, 0), xyz(arm.shaft, 0)
-    for k in range(len(arm.axes)):  # the last joint turns first, about its axis at 0
-        i = len(arm.axes) - 1 - k
-        a, o = xyz(arm.axes[i], 0), xyz(arm.origins[i], 0)
-        c, s = cos(q[i]), sin(q[i])
-        tip = along(o, 1.0, turned(sub(tip, o), a, c, s))
-        x, z = turned(x, a, c, s), turned(z, a, c, s)
+    n = len(arm.axes)
+    tip, x, z, _ = walk(arm, q, np.empty((n, 3)), np.empty((n, 3)))
     return tip, x, z
 
 
 @compiled
 def tip_position(arm: Any, q: Numbers) -> Vector:
     """p_WT of the tool's tip at a posture (n) [rad], in m."""
-    n = len(arm.axes)
-    return walk(arm, q, np.empty((n, 3)), np.empty((n, 3)))[0]
+    return tip_frame(arm, q)[0]
 
 
 @compiled
@@ -135,7 +131,7 @@ def tool_state(arm: Any, q: Numbers) -> tuple[Vector, Vector, np.ndarray, np.nda
     """
     n = len(arm.axes)
     axes, origins = np.empty((n, 3)), np.empty((n, 3))
-    tip, shaft, centre = walk(arm, q, axes, origins)
+    tip, _, shaft, centre = walk(arm, q, axes, origins)
     J, torque = np.empty((6, n)), np.empty(n)
     weight = xyz(arm.weight, 0)
     for i in range(n):

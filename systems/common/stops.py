@@ -1,22 +1,26 @@
-"""Why the robot stands: one list for all that may stop it."""
+"""Codes with texts, and why the robot stands: one list for all that may stop it."""
 
 from enum import IntEnum
 
 
-class Stop(IntEnum):
-    """The code of a stop, as signals carry it, and its text.
+class Code(IntEnum):
+    """A code, as signals carry it, and its text.
 
-    A compiled function makes a float of it with `float(stop.value)`.
+    A compiled function makes a float of it with `float(code.value)`.
     """
 
     text: str
 
-    def __new__(cls, code: int, text: str) -> "Stop":
+    def __new__(cls, code: int, text: str) -> "Code":
         """Makes a member of its code and its text."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.text = text
         return member
+
+
+class Stop(Code):
+    """Of a stop."""
 
     MOVING = 0, "it moves"
     TARGET_LOST = 1, "target lost by the tracker"

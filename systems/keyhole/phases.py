@@ -15,6 +15,7 @@ from systems.common.parameter import check, parameter
 from systems.common.signal import Vector, finiteness
 from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
 from systems.common.step_block import StepBlock
+from systems.common.stops import Code
 from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
 from systems.resection.wires.wire_watch import Alarm
 from systems.sensing.organ_estimator import OrganMotion
@@ -31,39 +32,22 @@ class Phases(IntEnum):
     STOPPED = 5
 
 
-class Reason(IntEnum):
-    """Why a phase was entered; `REASONS` has their texts."""
+class Reason(Code):
+    """Why a phase was entered."""
 
-    BEGIN = 0
-    PROBED = 1
-    ARRIVED = 2
-    GATE = 3
-    DONE = 4
-    ORGAN = 5
-    LOADED = 6
-    SENSOR = 7
-    WIRE = 8
-    NUMBERS = 9
-    CALM = 10
-    GIVEN_UP = 11
-    AWAY = 12
-
-
-REASONS = {
-    Reason.BEGIN: "the operation begins",
-    Reason.PROBED: "the wall has been probed",
-    Reason.ARRIVED: "the tube is at its station",
-    Reason.GATE: "tube unloaded, fulcrum and organ known: the gate is open",
-    Reason.DONE: "the plan is done",
-    Reason.ORGAN: "the organ does not move as it did: a cough, a held breath",
-    Reason.LOADED: "the wall is loaded",
-    Reason.SENSOR: "the wrist does not permit motion",
-    Reason.WIRE: "a wire is slack",
-    Reason.NUMBERS: "an input is not a number",
-    Reason.CALM: "everything is calm again",
-    Reason.GIVEN_UP: "it does not become calm: the tool goes home",
-    Reason.AWAY: "the tube has left its station",
-}
+    BEGIN = 0, "the operation begins"
+    PROBED = 1, "the wall has been probed"
+    ARRIVED = 2, "the tube is at its station"
+    GATE = 3, "tube unloaded, fulcrum and organ known: the gate is open"
+    DONE = 4, "the plan is done"
+    ORGAN = 5, "the organ does not move as it did: a cough, a held breath"
+    LOADED = 6, "the wall is loaded"
+    SENSOR = 7, "the wrist does not permit motion"
+    WIRE = 8, "a wire is slack"
+    NUMBERS = 9, "an input is not a number"
+    CALM = 10, "everything is calm again"
+    GIVEN_UP = 11, "it does not become calm: the tool goes home"
+    AWAY = 12, "the tube has left its station"
 
 
 @dataclass
@@ -113,8 +97,6 @@ class Chart(NamedTuple):
     force: Vector
 
 
-_PROBE, _APPROACH, _STATION = map(float, (0, 1, 2))
-_RESECT, _RETRACT, _STOPPED = map(float, (3, 4, 5))
 finite_organ, finite_fulcrum = finiteness(OrganMotion), finiteness(Fulcrum)
 finite_tube, finite_snake = finiteness(TubeStatus), finiteness(SnakeStatus)
 finite_alarm, finite_permission = finiteness(Alarm), finiteness(Permission)
@@ -128,17 +110,17 @@ def fault(
     organ: OrganMotion,
     alarm: Alarm,
     permission: Permission,
-) -> float:
-    """The `Reason` to stop, or 0."""
+) -> int:
+    """The `Reason` to stop, or that of the beginning if there is none."""
     if alarm.time >= 0.0:
-        return 8.0
+        return Reason.WIRE.value
     if organ.alarm != 0.0 or organ.sure == 0.0:
-        return 5.0
+        return Reason.ORGAN.value
     if permission.speed_scale <= 0.0:
-        return 7.0
+        return Reason.SENSOR.value
     if norm(chart.force) > c.loaded:
-        return 6.0
-    return 12.0 if tube.distance > c.far else 0.0
+        return Reason.LOADED.value
+    return Reason.AWAY.value if tube.distance > c.far else Reason.BEGIN.value
 
 
 @compiled
@@ -149,9 +131,9 @@ def is_calm(c: Any, chart: Chart, organ: OrganMotion, fulcrum: Fulcrum) -> bool:
 
 
 @compiled
-def entered(chart: Chart, code: float, time: float, reason: float) -> Chart:
-    """The chart in another phase."""
-    return Chart(code, time, reason, 0.0, chart.force)
+def entered(chart: Chart, phase: int, time: float, reason: int) -> Chart:
+    """The chart in another of the `Phases`, for a `Reason`."""
+    return Chart(float(phase), time, float(reason), 0.0, chart.force)
 
 
 @compiled
@@ -172,9 +154,9 @@ def step(
     sound = finite_tube(tube) and finite_snake(snake) and finite_organ(organ)
     sound = sound and finite_fulcrum(fulcrum) and finite_permission(permission)
     if not (sound and finite_alarm(alarm)):
-        if chart.code == _STOPPED or chart.code == _RETRACT:
+        if chart.code >= Phases.RETRACT.value:
             return Chart(chart.code, chart.since, chart.reason, 0.0, chart.force)
-        return entered(chart, _STOPPED, time, 9.0)
+        return entered(chart, Phases.STOPPED.value, time, Reason.NUMBERS.value)
     force = chart.force
     if wrench.valid > 0.5:
         now = across(wrench.f, shaft.u)
@@ -184,24 +166,24 @@ def step(
     chart = Chart(chart.code, chart.since, chart.reason, chart.calm, force)
     why = fault(c, chart, tube, organ, alarm, permission)
     arrived = tube.distance < c.near and tube.speed < c.slow
-    quiet = is_calm(c, chart, organ, fulcrum) and arrived and why == 0.0
+    quiet = is_calm(c, chart, organ, fulcrum) and arrived and not why
     calm = chart.calm + c.period if quiet else 0.0
     chart = Chart(chart.code, chart.since, chart.reason, calm, force)
     code = chart.code
-    if code == _PROBE and permission.speed_scale > 0.0 and time > c.smooth:
-        return entered(chart, _APPROACH, time, 1.0)
-    if code == _APPROACH and arrived:
-        return entered(chart, _STATION, time, 2.0)
-    if code == _STATION and calm >= c.calm:
-        return entered(chart, _RESECT, time, 3.0)
-    if code == _RESECT and why != 0.0:
-        return entered(chart, _STOPPED, time, why)
-    if code == _RESECT and snake.left <= 0.0:
-        return entered(chart, _RETRACT, time, 4.0)
-    if code == _STOPPED and calm >= c.calm:
-        return entered(chart, _RESECT, time, 10.0)
-    if code == _STOPPED and time - chart.since > c.patience:
-        return entered(chart, _RETRACT, time, 11.0)
+    if code == Phases.PROBE.value and permission.speed_scale > 0.0 and time > c.smooth:
+        return entered(chart, Phases.APPROACH.value, time, Reason.PROBED.value)
+    if code == Phases.APPROACH.value and arrived:
+        return entered(chart, Phases.STATION.value, time, Reason.ARRIVED.value)
+    if code == Phases.STATION.value and calm >= c.calm:
+        return entered(chart, Phases.RESECT.value, time, Reason.GATE.value)
+    if code == Phases.RESECT.value and why:
+        return entered(chart, Phases.STOPPED.value, time, why)
+    if code == Phases.RESECT.value and snake.left <= 0.0:
+        return entered(chart, Phases.RETRACT.value, time, Reason.DONE.value)
+    if code == Phases.STOPPED.value and calm >= c.calm:
+        return entered(chart, Phases.RESECT.value, time, Reason.CALM.value)
+    if code == Phases.STOPPED.value and time - chart.since > c.patience:
+        return entered(chart, Phases.RETRACT.value, time, Reason.GIVEN_UP.value)
     return chart
 
 

@@ -17,13 +17,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
+from plants.snake.tool_target import seen_from, target_of
 from systems.common.block import Block
 from systems.common.compiled import compiled
+from systems.common.geometry import along, pose_of, row_of
 from systems.common.parameter import check, parameter
-from systems.common.signal import flat, reader, size, view
+from systems.common.signal import flat, reader, size, view, writer
 from systems.keyhole.phases import Phases
 from systems.keyhole.signals import Phase, SnakeStatus, TubePose
 from systems.resection.wires.procedure_player import (
@@ -35,7 +36,8 @@ from systems.sensing.organ_estimator import OrganMotion
 
 Floats = np.ndarray
 _ALONG = (0.0, 0.0, 1.0)
-read_tube = reader(TubePose)
+read_tube, read_target = reader(TubePose), reader(ToolTarget)
+write_target = writer(ToolTarget)
 
 
 @dataclass
@@ -81,57 +83,29 @@ def smooth(share: float) -> float:
 
 
 @compiled
-def frame(x: Floats, z: Floats) -> Floats:
-    """Rotation matrix of two of its axes."""
-    R = np.empty((3, 3))
-    z = z / np.sqrt((z * z).sum())
-    x = x - (x * z).sum() * z
-    x = x / np.sqrt((x * x).sum())
-    R[:, 0], R[:, 2] = x, z
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        R[i, 1] = z[j] * x[k] - z[k] * x[j]
-    return R
-
-
-@compiled
 def in_channel(
-    target: Floats, R_WE: Floats, p_WE: Floats, tube: Floats, gap: float
+    target: Floats, E: Floats, p_WE: Floats, tube: Floats, gap: float
 ) -> Floats:
-    """A target given in E in C, both as elements.
+    """A target given in E, in C; all as elements.
 
     Args:
         target: Of a `ToolTarget`.
-        R_WE: Orientation of E.
+        E: x and z axes of E in W, (2, 3).
         p_WE: The entry.
         tube: Of a `TubePose`.
         gap: From the tube's end to C.
     """
     at = read_tube(tube)
-    R_WC = frame(np.array(at.x), np.array(at.z))
-    away = p_WE - np.array(at.p) - gap * R_WC[:, 2]
-    out = np.zeros(9)
-    for i in range(3):
-        for k in range(3):
-            out[i] += R_WC[k, i] * away[k]
-            turn = 0.0
-            for j in range(3):
-                turn += R_WC[j, i] * R_WE[j, k]
-            for part in range(3):
-                out[3 * part + i] += turn * target[3 * part + k]
-    return out
+    C = pose_of(along(at.p, gap, at.z), at.x, at.z)
+    return write_target(
+        seen_from(read_target(target), pose_of(p_WE, row_of(E, 0), row_of(E, 1)), C)
+    )
 
 
 @compiled
-def target_elements(x: Floats, h: float, offset: float) -> Floats:
+def target_elements(x: Floats, h: float, tool: float) -> Floats:
     """The elements of the `ToolTarget` of a posture x (7,)."""
-    c = np.empty((POINTS, 3))
-    corners(x, h, offset, c)
-    n, n_I = link_axis(c, 5, h), link_axis(c, 3, h)
-    out = np.empty(9)
-    for i in range(3):
-        out[i], out[3 + i], out[6 + i] = c[POINTS - 1, i], n[i], n_I[i]
-    return out
+    return write_target(target_of(x, h, tool))
 
 
 @dataclass
@@ -211,7 +185,7 @@ class SnakeTask(Block):
             straight[:, 0] = -0.035, -0.030
             plan = Plan(straight, np.array([0.3, 1.3]))
         self._plan, self._gap = plan, gap
-        self._R_WE = frame(*(np.array(axis, float) for axis in axes))
+        self._axes = np.array(axes, float)
         length = 3 * self._snake.straight_module + self._snake.tool_offset
         self._length, self._advance = length, standoff - gap
         # Translations in C: within the tube, just out of it.
@@ -313,12 +287,11 @@ class SnakeTask(Block):
         in_tube = np.array([0.0, 0.0, z, *_ALONG, *_ALONG])
         if now.way <= out:
             return in_tube
-        p_WE = view(OrganMotion, organ).p.copy()
-        R_WE = self._R_WE
+        p_WE, E = view(OrganMotion, organ).p.copy(), self._axes
         if not self._p.follow:
             at = view(TubePose, tube)
-            p_WE, R_WE = at.p + self._gap * at.z, frame(R_WE[:, 0].copy(), at.z.copy())
-        told = in_channel(self._tool(now), R_WE, p_WE, tube.copy(), self._gap)
+            p_WE, E = at.p + self._gap * at.z, np.stack([E[0], at.z])
+        told = in_channel(self._tool(now), E, p_WE, tube.copy(), self._gap)
         share = smooth((now.way - out) / (over - out))
         return in_tube + share * (told - in_tube)
 

@@ -27,13 +27,14 @@ from diagrams.common.run import simulate
 from diagrams.snake.scenario import ELASTIC_STEP
 from diagrams.studies import load_scenario
 from plants.snake.actuation import angles_of_lengths, wire_lengths
+from plants.snake.balls import turns_of
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.inverse_kinematics import positioning, tool_postures
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
-from plants.snake.statics import Statics, turns_of
+from plants.snake.statics import Statics
 from plants.snake.tension import tensions
 from systems.resection.wires.tip_reference import reference
 from tests.benchmarks.snake_mujoco import model_xml

@@ -14,12 +14,13 @@ import pytest
 from diagrams.studies import STUDIES, build, load_scenario
 import plants
 from plants.surgeon.guided_tool import GuidedTool
+from plants.surgeon.led_tool import LedTool
 import systems
 from systems.common.block import Block
 from systems.common.step_block import StepBlock
 from systems.switching.navigation_planner import NavigationPlanner
 
-BASES = (Block, StepBlock, NavigationPlanner)
+BASES = (Block, StepBlock, NavigationPlanner, LedTool)
 
 
 def all_blocks(package) -> list[type]:

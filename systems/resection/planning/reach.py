@@ -37,8 +37,8 @@ from systems.resection.planning.entry import PILOT, entry_pass
 from systems.resection.planning.growth import grow, tilted, tool_posture
 from systems.resection.planning.session import Session
 
-FORMAT = 1
-"""Of the file of what is reachable."""
+FORMAT = 2
+"""Of the file of what is reachable; 2: from how many nodes it began."""
 
 ROUND = 20_000
 """Attempts between two looks at what is left, at effort 1."""
@@ -214,6 +214,7 @@ def save_reach(
         "fraction": reach.fraction,
         "time": reach.time,
         "steps": reach.steps,
+        "nodes": reach.nodes,
         "lumps": [asdict(lump) for lump in reach.lumps],
     }
     arrays = {"mask": reach.mask, "x": reach.x, "parent": reach.parent}
@@ -245,11 +246,11 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any], session: Session) ->
     share = np.count_nonzero(mask) / np.count_nonzero(session.volume.labels == TUMOUR)
     if (mask & (session.volume.labels != TUMOUR)).any() or share != meta["fraction"]:
         raise ValueError("mask and fraction are not the tumour's")
-    x, parent = arrays["x"], arrays["parent"]
-    if ((parent < 0) | (parent > len(x))).any():
+    x, parent, nodes = arrays["x"], arrays["parent"], int(meta["nodes"])
+    if nodes < 1 or ((parent < 0) | (parent >= nodes + len(x))).any():
         raise ValueError("a parent that there is not")
     time, steps = float(meta["time"]), int(meta["steps"])
-    return Reach(mask, share, time, steps, lumps, x, parent, 1)
+    return Reach(mask, share, time, steps, lumps, x, parent, nodes)
 
 
 def _key(session: Session, seed: int, effort: float) -> str:

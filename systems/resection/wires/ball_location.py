@@ -4,10 +4,10 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from plants.snake.balls import BALLS, gaps, tool_pose, turns_of_angles
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array
 from plants.snake.signals import MODULE_NUMBERS, BallState, Numbers, ToolPose
-from plants.snake.statics import BALLS, gaps, tool_pose, turns_of_angles
 from systems.common.block import Block
 from systems.common.parameter import check
 from systems.common.signal import Field, flat, vector, view

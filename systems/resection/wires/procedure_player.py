@@ -7,14 +7,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from plants.snake.kinematics import POINTS, corners, link_axis
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
+from plants.snake.tool_target import target_of
 from plants.tissue.tissue_carver import Entry
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, flat, vector
+from systems.common.signal import Field, flat
 
 
 class Progress(NamedTuple):
@@ -221,13 +221,6 @@ def played(
     return between
 
 
-def target_of(x: NDArray[np.float64], snake: SnakeParams) -> ToolTarget:
-    """The tool's pose of a posture (7,), with its intermediate axis."""
-    c, h = np.empty((POINTS, 3)), snake.half_pitch
-    corners(x, h, snake.tool_offset, c)
-    return ToolTarget(vector(c[-1]), link_axis(c, 5, h), link_axis(c, 3, h))
-
-
 class ProcedurePlayer(Block):
     """Plays the postures of a plan, at the rates the robot can keep.
 
@@ -299,7 +292,7 @@ class ProcedurePlayer(Block):
     def target(self, time: float) -> ToolTarget:
         """The tool's pose at a time in s."""
         x = played(self._x, self._profile, self._params, time)
-        return target_of(x, self._snake)
+        return target_of(x, self._snake.half_pitch, self._snake.tool_offset)
 
     def _calc_target(self, context: Any) -> np.ndarray:
         return flat(self.target(context.get_time() + self._params.lead))

@@ -5,6 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.balls import BALLS, angles_of, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
@@ -18,7 +19,7 @@ from plants.snake.signals import (
     ToolForce,
 )
 from plants.snake.snake import BALL_POSITIONS
-from plants.snake.statics import BALLS, Equilibrium, Statics, angles_of, turns_of
+from plants.snake.statics import Equilibrium, Statics
 from systems.common.block import Block
 from systems.common.signal import Field, flat, view
 

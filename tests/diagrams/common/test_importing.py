@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from diagrams.common.cli import IMPORTED, main
+from diagrams.common.arguments import IMPORTED
+from diagrams.common.cli import main
 from diagrams.common.importing import KINDS
 from diagrams.studies import load_scenario
 from plants.surgeon.recording import load_recording

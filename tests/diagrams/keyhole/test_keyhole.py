@@ -37,6 +37,13 @@ def test_circle():
     ]
 
 
+def test_what_was_not_measured_is_no_zero():
+    figures = run("keyhole_approach", "duration=14").metrics
+    assert figures["time_at_work"] == 0.0
+    for key in ("rms_tool_error", "max_tool_error", "rms_organ_error", "ik_refused"):
+        assert figures[key] is None
+
+
 def test_the_snake_leaves_the_tube_after_the_gate_alone():
     result = run("keyhole_circle", SHORT)
     time, gate = result.signals["time"], result.metrics["gate_opened"]

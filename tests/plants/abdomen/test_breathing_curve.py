@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from plants.abdomen.breathing_curve import load_curve, read_unitless
+from plants.abdomen.organ_motion import OrganMotionParams
 from plants.abdomen.wall_motion import WallMotionParams
 
 
@@ -30,6 +31,16 @@ def test_the_wall_follows_a_curve_again_and_again(tmp_path):
     wall = WallMotionParams(breathing=[0.01, 0.0, 0.0], curve=str(path))
     for time in (0.5, 4.5, 8.5):
         assert wall.displacement(time)[0] == pytest.approx(0.005)
+
+
+def test_organs_breathe_with_the_recorded_curve(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("t,b\n0,0\n1,1\n3,-1\n4,0\n")
+    wall = WallMotionParams(breathing=[0.01, 0.0, 0.0], rate=0.25, curve=str(path))
+    organ = OrganMotionParams(breathing=[0.0, 0.0, 0.02])
+    assert organ.displacement(0.5, wall)[2] == pytest.approx(0.01)
+    late = OrganMotionParams(breathing=[0.0, 0.0, 0.02], lag=0.25)  # a second
+    assert late.displacement(1.5, wall)[2] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from plants.faults.faulty_wire import KINDS, Fault, FaultyWire
+from plants.faults.fault import KINDS, Fault
+from plants.faults.faulty_wire import BREAKS, FaultyWire
 from systems.common.parameter import ParameterError
 from systems.common.signal import flat, view
 from systems.common.signals import TrackedShaft, Wrench
@@ -73,3 +74,7 @@ def test_a_slow_arm_moves_no_faster():
 def test_an_unknown_kind_is_named():
     with pytest.raises(ParameterError, match=r"faults.kind='stuck'.*force_stuck"):
         FaultyWire(Fault("stuck"))
+
+
+def test_every_kind_breaks_something():
+    assert set(KINDS) == set(BREAKS)

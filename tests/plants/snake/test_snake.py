@@ -7,13 +7,13 @@ from pydrake.multibody.plant import MultibodyPlant
 import pytest
 
 from plants.snake.actuation import wire_lengths
+from plants.snake.balls import turns_of
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.elastic import elastic_pull
 from plants.snake.kinematics import forward, frames
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS, add_snake
-from plants.snake.statics import turns_of
 from plants.snake.tension import length_jacobian
 from plants.snake.wire_path import hanging_points, tangent_points, wires_at
 

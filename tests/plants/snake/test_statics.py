@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 
 from plants.snake.actuation import wire_lengths
+from plants.snake.balls import TURNS, gaps, tool_pose, turned_by, turns_of
 from plants.snake.core import SnakeCoreParams, torques_against_core
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
-from plants.snake.statics import (
-    TURNS,
-    Statics,
-    gaps,
-    tool_pose,
-    turned_by,
-    turns_of,
-)
+from plants.snake.statics import Statics
 from plants.snake.tension import tensions, torques_against
 from plants.snake.weight import weight
 from systems.common.parameter import ParameterError

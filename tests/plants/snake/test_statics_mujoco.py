@@ -1,12 +1,11 @@
 """Statics beside MuJoCo's: ball joints, and tendons that wrap spheres."""
 
+import mujoco
 import numpy as np
-import pytest
 
-from plants.snake.statics import Statics, gaps, tool_pose, turns_of
+from plants.snake.balls import gaps, tool_pose, turns_of
+from plants.snake.statics import Statics
 from tests.plants.snake.test_statics import PARAMS, posture
-
-mujoco = pytest.importorskip("mujoco", reason="pip install 'trocar[peers]'")
 
 
 def model_xml(model):

@@ -8,7 +8,7 @@ import pytest
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import POSITION_LIMIT
 from plants.instruments.instrument import InstrumentParams
-from systems.common.serial_arm import read_arm, tip_position, tool_state
+from systems.common.serial_arm import read_arm, tip_frame, tip_position, tool_state
 
 PLANTS = {
     "usual": make_controller_plant(),
@@ -40,3 +40,6 @@ def test_tool_is_where_the_plant_says(name, seed):
     expected = plant.CalcGravityGeneralizedForces(context)
     np.testing.assert_allclose(weight, expected, atol=1e-12)
     assert tip_position(arm, q) == p
+    x, z = tip_frame(arm, q)[1:]
+    np.testing.assert_allclose(x, X_WT.rotation().col(0), atol=1e-12)
+    assert z == u

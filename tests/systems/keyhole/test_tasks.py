@@ -64,7 +64,7 @@ def test_a_target_in_the_organ_is_one_in_the_channel():
         p_WE, p_WP, p_E = rng.normal(size=(3, 3))
         tube = flat(TubePose(p_WP, R_WC[:, 0], R_WC[:, 2]))
         target = flat(ToolTarget(p_E, *np.eye(3)[:2]))
-        out = in_channel(target, R_WE, p_WE, tube, 0.04)
+        out = in_channel(target, R_WE.T[::2].copy(), p_WE, tube, 0.04)
         p_WC = p_WP + 0.04 * R_WC[:, 2]
         np.testing.assert_allclose(p_WC + R_WC @ out[:3], p_WE + R_WE @ p_E, atol=1e-12)
         np.testing.assert_allclose(R_WC @ out[3:6], R_WE[:, 0], atol=1e-12)

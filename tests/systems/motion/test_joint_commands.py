@@ -16,13 +16,8 @@ from systems.common.signal import flat, size, vector
 from systems.common.signals import Permission, ToolMotion
 from systems.common.stops import Stop
 from systems.motion import joint_commands
-from systems.motion.joint_commands import (
-    LIMP,
-    JointCommands,
-    JointCommandsParams,
-    free_velocity,
-    joint_velocity,
-)
+from systems.motion.joint_commands import LIMP, JointCommands, JointCommandsParams
+from systems.motion.joint_velocity import free_velocity, joint_velocity
 
 PLANT = make_controller_plant()
 TIP = PLANT.GetFrameByName(INSTRUMENT_TIP)

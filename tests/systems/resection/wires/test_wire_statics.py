@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from plants.snake.actuation import wire_lengths
+from plants.snake.balls import angles_of, turns_of
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.signals import BallState
-from plants.snake.statics import angles_of, turns_of
 from systems.common.parameter import ParameterError
 from systems.resection.wires.ball_location import BallLocation
 from systems.resection.wires.tool_load import ToolLoad, ToolLoadParams

@@ -1,0 +1,223 @@
+"""What the command line takes: commands, their arguments, and help that teaches."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+IMPORTED = ("jigsaws", "dvrk", "plus", "csv", "breathing", "crowd")
+"""Kinds of recordings that can be imported."""
+
+EXAMPLES = """\
+examples:
+  trocar scenarios                          what there is to run
+  trocar run gauze_dynamic                  results in out/gauze_dynamic
+  trocar run 'pwe_*' nav_crowd              several, one after the other
+  trocar live gauze_dynamic                 take part, in the browser
+  trocar replay out/gauze_dynamic           opens the replay in the browser
+  trocar compare out/gauze_static out/printed
+  trocar run gauze_static --set go_to_target.form=printed --out out/printed
+  trocar run out/gauze_dynamic/scenario.yaml --seed 7
+  trocar diagram gauze_static               the block diagram as a picture
+  trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
+  trocar resect resect_paper                plan a resection by hand
+  trocar export out/resect_paper.session --to viewer   what a viewer can load
+  trocar import FILE --kind jigsaws         another's recording as one of ours
+  trocar access keyhole_resect              entries and trocars, ranked by reach
+  trocar campaign operations --runs 200     many runs, and how sure that is
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the command line."""
+    parser = argparse.ArgumentParser(
+        prog="trocar",
+        description="An open testbed for autonomous keyhole surgery on Drake.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=Version, nargs=0, help="version and commit")
+    named, changed, seeded = (argparse.ArgumentParser(add_help=False) for _ in range(3))
+    named.add_argument("name", metavar="NAME", help="a scenario's name or its file")
+    seeded.add_argument("--seed", type=int, metavar="N", help="seed of the noise")
+    changed.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="KEY.SUB=VALUE",
+        help="change a value of the scenario, e.g. abdomen.stiffness=800; repeatable",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    commands.add_parser("scenarios", help="list the scenarios, one line each")
+    run = commands.add_parser(
+        "run",
+        parents=[changed, seeded],
+        help="run a scenario and write figures, plots, log and replay",
+        description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
+        "PNG, replay.html, report.html and scenario.yaml (exactly what ran) into DIR.",
+    )
+    run.add_argument(
+        "names", metavar="NAME", nargs="+", help="a scenario's name, pattern or file"
+    )
+    run.add_argument(
+        "--out", metavar="DIR", type=Path, help="default: out/NAME; of several DIR/NAME"
+    )
+    run.add_argument("--json", action="store_true", help="print the figures as JSON")
+    run.add_argument("--duration", type=float, metavar="S", help="simulated seconds")
+    run.add_argument(
+        "--no-replay", action="store_true", help="do not record replay.html"
+    )
+    compare = commands.add_parser(
+        "compare", help="two runs side by side: figures, and signals over each other"
+    )
+    compare.add_argument("one", metavar="DIR", type=Path, help="results of a run")
+    compare.add_argument("other", metavar="DIR", type=Path, help="of another")
+    compare.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/compare.png"
+    )
+    live = commands.add_parser(
+        "live",
+        parents=[named, changed, seeded],
+        help="run a gauze scenario in real time and take part in the browser",
+        description="Runs a gauze scenario in real time: the surgeon's tools follow "
+        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
+        "target; space: pause). What the hands did is kept as recordings, and run "
+        "again at the end for figures and replay.",
+    )
+    live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")
+    live.add_argument("--duration", type=float, metavar="S", help="default: 600 s")
+    live.add_argument("--out", metavar="DIR", type=Path, help="default: out/live")
+    live.add_argument(
+        "--host", default="localhost", help="where it listens; '*' for everyone"
+    )
+    replay = commands.add_parser("replay", help="open a run's replay in the browser")
+    replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
+    shell = commands.add_parser(
+        "completion",
+        help="print a shell's completion script",
+        description="Prints a completion script: "
+        "trocar completion bash > ~/.local/share/bash-completion/completions/trocar",
+    )
+    shell.add_argument("shell", choices=("bash", "zsh", "tcsh"))
+    draw = commands.add_parser(
+        "diagram", parents=[named], help="draw a scenario's block diagram"
+    )
+    draw.add_argument(
+        "--out", metavar="FILE", type=Path, help="SVG or PNG; default: out/NAME.svg"
+    )
+    keys = commands.add_parser(
+        "keys",
+        parents=[named],
+        help="list a scenario's keys with value, unit, bounds and meaning",
+        description="Lists what `--set` can change in a scenario.",
+    )
+    keys.add_argument(
+        "pattern", metavar="PATTERN", nargs="?", default="", help="part of the key"
+    )
+    keys.add_argument("--json", action="store_true", help="for programs")
+    access = commands.add_parser(
+        "access",
+        parents=[named, changed],
+        help="propose entries and trocars of a keyhole operation",
+        description="Tries entries through the scenario's trocar, and trocars on the "
+        "wall; a table, and a picture in FILE.",
+    )
+    access.add_argument(
+        "--out", metavar="FILE", type=Path, help="PNG; default: out/NAME.access.png"
+    )
+    resect = commands.add_parser(
+        "resect",
+        parents=[named, changed],
+        help="plan a resection by hand, line by line",
+        description="Proposes, checks, commits and undoes procedures; `help` lists "
+        "the commands. The session is saved after every commit, and resumed.",
+    )
+    resect.add_argument(
+        "--session", metavar="FILE", type=Path, help="default: out/NAME.session"
+    )
+    export = commands.add_parser(
+        "export",
+        help="write a resection's session for a viewer: label maps, path, channels",
+        description="Writes label maps on the mask's own grid (NRRD, NIfTI) and on "
+        "the plan's, the tool's path (VTK), the channels (OBJ), in LPS and mm, and "
+        "the plan (JSON). Needs the extra `images`.",
+    )
+    export.add_argument(
+        "source", metavar="SESSION", type=Path, help="a session's file, or a run's DIR"
+    )
+    export.add_argument(
+        "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
+    )
+    add_import(commands)
+    campaign = commands.add_parser(
+        "campaign",
+        help="run a scenario many times, varied, and say how sure the answer is",
+        description="Runs a campaign; started again with the same DIR it goes on. "
+        "Writes runs/ (Parquet), report.html, summary.json and the worst runs as "
+        "scenarios. Needs the extra `campaigns`.",
+    )
+    campaign.add_argument("name", metavar="NAME", help="a campaign's name or its file")
+    campaign.add_argument("--runs", type=int, metavar="N", help="of each variant")
+    campaign.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one a core"
+    )
+    campaign.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
+    )
+    campaign.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
+    campaign.add_argument("--seed", type=int, metavar="N", help="of the draws")
+    campaign.add_argument(
+        "--planner",
+        metavar="MODULE:CLASS",
+        default="",
+        help="a planner of one's own as a further variant of `crossing`",
+    )
+    return parser
+
+
+def add_import(commands: Any) -> None:
+    """Adds `trocar import` to a parser's commands."""
+    parser = commands.add_parser(
+        "import",
+        help="make the project's own file of another's recording",
+        description="Reads a recording, says what it holds, and writes a CSV (of a "
+        "crowd: a scenario). Nothing of it is kept elsewhere.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path)
+    parser.add_argument("--kind", choices=IMPORTED, required=True)
+    parser.add_argument("--out", metavar="FILE", type=Path, help="default: out/STEM.*")
+    parser.add_argument(
+        "--place",
+        metavar="X,Y,Z",
+        default="0,0,-0.11",
+        help="of the motion's mean in W [m]",
+    )
+    parser.add_argument(
+        "--yaw", type=float, default=0.0, help="turn about the vertical [deg]"
+    )
+    parser.add_argument(
+        "--arm",
+        default="",
+        help="jigsaws: master_left ... slave_right; plus: its transform, e.g. "
+        "ProbeToTracker; breathing: the column",
+    )
+    parser.add_argument(
+        "--rate", type=float, default=100.0, help="breathing: samples a second"
+    )
+    parser.add_argument(
+        "--start", type=float, default=0.0, help="crowd: first second of it"
+    )
+    parser.add_argument(
+        "--duration", type=float, default=40.0, help="crowd: how long [s]"
+    )
+
+
+class Version(argparse.Action):
+    """Prints the version and the commit, and ends."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *more: object) -> None:
+        """Called for `--version`."""
+        from diagrams.common.provenance import commit, release
+
+        print(" ".join(filter(None, ["trocar", release(), commit()])))
+        parser.exit()

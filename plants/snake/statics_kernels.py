@@ -1,0 +1,218 @@
+"""The energy of the snake's free balls and its derivatives, compiled: see `statics`."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plants.snake.balls import BALLS, TURNS, times
+from plants.snake.parameters import MODULES, WIRES
+from systems.common.compiled import compiled
+from systems.common.geometry import along, over, scaled
+
+ROPES = WIRES * MODULES
+
+
+class Forces(NamedTuple):
+    """What the energy's derivatives are made of: in and out of the kernels.
+
+    Attributes:
+        L: Lengths of the wires' paths, (9,).
+        T: Their tensions, (9,).
+        J: dL/d(delta), (9, 18).
+        g: Gradient of the energy, (18,).
+        H: Its Hessian, (18, 18).
+    """
+
+    L: Any
+    T: Any
+    J: Any
+    g: Any
+    H: Any
+
+
+@compiled
+def empty_forces() -> Forces:
+    """Room for them."""
+    return Forces(
+        np.zeros(ROPES),
+        np.zeros(ROPES),
+        np.zeros((ROPES, TURNS)),
+        np.zeros(TURNS),
+        np.zeros((TURNS, TURNS)),
+    )
+
+
+@compiled
+def path_over(p: float, s: Any) -> tuple[float, float, float]:
+    """The path f of a chord, and its first two derivatives."""
+    if p <= 2 * s.d:
+        return p + s.e, 1.0, 0.0
+    rho2 = s.R * s.R + s.d * s.d
+    q = math.sqrt(max(rho2 - p * p / 4, 1e-12))
+    arc = math.asin(min(p / (2 * math.sqrt(rho2)), 1.0)) - math.atan(s.d / s.R)
+    return 2 * s.h + 2 * s.R * arc, s.R / q, s.R * p / 4 / q**3
+
+
+@compiled
+def _core(Q: Any, s: Any, g: Any, H: Any) -> float:
+    """Energy of one ball's core and rims; adds its derivatives to g and H."""
+    # cos(beta) = z . Q z, and the twist's sine and cosine, u = Q_yx - Q_xy and
+    # v = Q_xx + Q_yy: their gradients, and their Hessians.
+    gc = (-Q[2, 1], Q[2, 0], 0.0)
+    beta = math.atan2(math.hypot(Q[0, 2], Q[1, 2]), Q[2, 2])
+    past = max(0.0, beta - s.stop)
+    energy = 0.5 * s.bend * beta * beta + 0.5 * s.rim * past * past
+    torque = s.bend * beta + s.rim * past
+    stiff = s.bend + (s.rim if past > 0.0 else 0.0)
+    sine = math.sin(beta)
+    if beta < 1e-4:
+        g1, g2 = -s.bend, s.bend / 3
+    else:
+        g1 = -torque / sine
+        g2 = (stiff * sine - torque * math.cos(beta)) / sine**3
+    u, v = Q[1, 0] - Q[0, 1], Q[0, 0] + Q[1, 1]
+    n2 = u * u + v * v
+    angle = math.atan2(u, v)
+    energy += 0.5 * s.twist * angle * angle
+    # Of a term P . Q c: c x r with r the row of Q that P picks.
+    gu = (-Q[0, 2], -Q[1, 2], v)
+    gv = (Q[1, 2], -Q[0, 2], -u)
+    gt = over(along(scaled(v, gu), -u, gv), n2)
+    for i in range(3):
+        g[i] += g1 * gc[i] + s.twist * angle * gt[i]
+        for j in range(3):
+            hc = 0.5 * (Q[2, i] * (j == 2) + Q[2, j] * (i == 2)) - Q[2, 2] * (i == j)
+            hu = 0.5 * (Q[1, i] * (j == 0) + Q[1, j] * (i == 0)) - Q[1, 0] * (i == j)
+            hu -= 0.5 * (Q[0, i] * (j == 1) + Q[0, j] * (i == 1)) - Q[0, 1] * (i == j)
+            hv = 0.5 * (Q[0, i] * (j == 0) + Q[0, j] * (i == 0)) - Q[0, 0] * (i == j)
+            hv += 0.5 * (Q[1, i] * (j == 1) + Q[1, j] * (i == 1)) - Q[1, 1] * (i == j)
+            ht = (v * hu - u * hv) / n2
+            # d/d(u, v) of (v, -u)/n2
+            ht -= 2 * u * v / n2**2 * (gu[i] * gu[j] - gv[i] * gv[j])
+            ht -= (v * v - u * u) / n2**2 * (gu[i] * gv[j] + gv[i] * gu[j])
+            H[i, j] += g2 * gc[i] * gc[j] + g1 * hc
+            H[i, j] += s.twist * (gt[i] * gt[j] + angle * ht)
+    return energy
+
+
+@compiled
+def _loads(turns: Any, load: Any, s: Any, g: Any, H: Any) -> float:
+    """Energy of weight and tool force; adds derivatives, also of the moment."""
+    A = np.empty((BALLS, 3, 3))
+    A[0] = turns[0]
+    for i in range(1, BALLS):
+        times(A[i - 1], turns[i], A[i])
+    # From the tip inwards: forces f beyond each ball, and S = sum (p - o) f^T about
+    # its centre. Turns w_i and w_j, j beyond i, change the energy by
+    # -w_i . (S_j - tr S_j) w_j; a moment by the symmetric half of its Jacobian.
+    F = np.empty(3)
+    S, X, XA = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    m = (load[3], load[4], load[5])
+    M = ((0.0, -m[2], m[1]), (m[2], 0.0, -m[0]), (-m[1], m[0], 0.0))
+    for k in range(3):
+        F[k] = load[k] + s.ring * s.g[k]
+    arm = s.tool
+    for j in range(BALLS - 1, -1, -1):
+        for a in range(3):
+            for b in range(3):
+                half = s.h * s.plate * s.g[b]
+                S[a, b] += A[j, a, 2] * ((arm + 2 * s.h) * F[b] + half)
+        arm = 0.0
+        trace = S[0, 0] + S[1, 1] + S[2, 2]
+        turn = (
+            S[1, 2] - S[2, 1] + m[0],
+            S[2, 0] - S[0, 2] + m[1],
+            S[0, 1] - S[1, 0] + m[2],
+        )
+        for a in range(3):
+            g[3 * j + a] -= A[j, 0, a] * turn[0] + A[j, 1, a] * turn[1]
+            g[3 * j + a] -= A[j, 2, a] * turn[2]
+            for b in range(3):
+                X[a, b] = S[a, b] - (trace if a == b else 0.0) - 0.5 * M[a][b]
+        times(X, A[j], XA)
+        for i in range(j + 1):
+            for a in range(3):
+                for b in range(3):
+                    value = A[i, 0, a] * XA[0, b] + A[i, 1, a] * XA[1, b]
+                    value += A[i, 2, a] * XA[2, b]
+                    half = 0.5 if i == j else 1.0
+                    H[3 * i + a, 3 * j + b] -= half * value
+                    H[3 * j + b, 3 * i + a] -= half * value
+        for k in range(3):
+            F[k] += (s.plate + s.ball) * s.g[k]
+    return -(S[0, 0] + S[1, 1] + S[2, 2])
+
+
+@compiled
+def assembled(
+    turns: Any, pull: Any, stiffness: float, wound: Any, load: Any, s: Any, to: Forces
+) -> float:
+    """Energy of the balls' turns (6, 3, 3), and its derivatives.
+
+    Args:
+        turns: R_i.
+        pull: Tensions of wires as long as `wound`, in N, (9,).
+        stiffness: Of a wire in N/m; 0 for tensions that are `pull`.
+        wound: L_d in m, (9,).
+        load: Force and moment on the tool in W, (6,).
+        s: The snake, as `Statics` packs it.
+        to: Where the derivatives go.
+
+    Returns:
+        The energy in J.
+    """
+    to.L[:] = 0.0
+    to.J[:] = 0.0
+    to.g[:] = 0.0
+    to.H[:] = 0.0
+    R, d = s.R, s.d
+    rho2 = R * R + d * d
+    kept = np.empty((BALLS, ROPES, 7))
+    for i in range(BALLS):
+        Q = turns[i]
+        for w in range(WIRES * (i // 2), ROPES):
+            x, y = s.points[w, 0], s.points[w, 1]
+            r0 = Q[0, 0] * x + Q[1, 0] * y - Q[2, 0] * d
+            r1 = Q[0, 1] * x + Q[1, 1] * y - Q[2, 1] * d
+            r2 = Q[0, 2] * x + Q[1, 2] * y - Q[2, 2] * d
+            rc = r0 * x + r1 * y + r2 * d
+            p = math.sqrt(max(2 * (rho2 - rc), 1e-12))
+            f, f1, f2 = path_over(p, s)
+            to.L[w] += f
+            to.J[w, 3 * i] = -f1 * (y * r2 - d * r1) / p
+            to.J[w, 3 * i + 1] = -f1 * (d * r0 - x * r2) / p
+            to.J[w, 3 * i + 2] = -f1 * (x * r1 - y * r0) / p
+            k = kept[i, w]
+            k[0], k[1], k[2], k[3], k[4], k[5], k[6] = r0, r1, r2, rc, p, f1, f2
+    energy = 0.0
+    for w in range(ROPES):
+        T = pull[w] + stiffness * (to.L[w] - wound[w])
+        if T < 0.0:  # slack; what is no number stays none
+            T = 0.0
+        to.T[w] = T
+        energy += T * T / (2 * stiffness) if stiffness > 0.0 else T * to.L[w]
+        count = 6 * (w // WIRES + 1)
+        for a in range(count):
+            to.g[a] += T * to.J[w, a]
+        if T > 0.0 and stiffness > 0.0:
+            for a in range(count):
+                ka = stiffness * to.J[w, a]
+                for b in range(count):
+                    to.H[a, b] += ka * to.J[w, b]
+    for i in range(BALLS):
+        H = to.H[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
+        for w in range(WIRES * (i // 2), ROPES):
+            k, T = kept[i, w], to.T[w]
+            r, rc, p, f1, f2 = k[:3], k[3], k[4], k[5], k[6]
+            c = (s.points[w, 0], s.points[w, 1], d)
+            # f'' gp gp^T + f' hess p, with gp = J / f'
+            bowed, share = T * (f2 - f1 / p) / (f1 * f1), T * f1 / p
+            for a in range(3):
+                Ja = bowed * to.J[w, 3 * i + a]
+                for b in range(3):
+                    half = 0.5 * (r[a] * c[b] + r[b] * c[a])
+                    H[a, b] += Ja * to.J[w, 3 * i + b] - share * half
+                H[a, a] += share * rc
+        energy += _core(turns[i], s, to.g[3 * i : 3 * i + 3], H)
+    return energy + _loads(turns, load, s, to.g, to.H)
