@@ -52,5 +52,7 @@ class Mode(NamedTuple):
     ] = 0.0
 
 
-SEEN = Many(Seen, ROWS)
+STANDING = 64
+"""Number of points of what stands that there is room for, beside the obstacles."""
+SEEN = Many(Seen, (*ROWS, *(f"s{k}" for k in range(STANDING))))
 NOISE = Many(Noise, ROWS)

@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from plants.crowd.orca import orca_towards
 from plants.crowd.signals import Obstacle
+from plants.crowd.walls import WallParams
 
 Frame = list[tuple[float, float, float, float, float]]
 """x, y [m], radius [m], v_x, v_y [m/s] of every obstacle at one instant."""
@@ -53,6 +54,7 @@ class Scene:
     robot: Robot = field(default_factory=lambda: TURTLEBOT)
     dt: float = 0.05  # s
     time_limit: float = 90.0  # s
+    walls: list[WallParams] = field(default_factory=list)
 
 
 def steady(discs: list[tuple[float, float, float, float, float]], dt: float):
