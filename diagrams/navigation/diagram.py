@@ -61,6 +61,7 @@ SENSED = (
     ("lidar.scan", "tracking.scan"),
     ("mapping.grid", "tracking.grid"),
     ("tracking.seen", "planner.seen"),
+    ("tracking.corners", "planner.corners"),
     ("mapping.place", "planner.robot"),
     ("mapping.place", "control.robot"),
 )
@@ -110,6 +111,7 @@ def make_planner(scenario: NavigationScenario) -> Any:
         body_radius=radius,
         speed=speed,
         vision=scenario.perception.vision,
+        braking=scenario.robot.acceleration,
         # What stands must not seem to move by the noise of its measured velocity.
         standing_speed=max(
             scenario.switching.standing_speed, 3.0 * scenario.perception.velocity_noise

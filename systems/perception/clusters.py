@@ -7,7 +7,7 @@ out; two legs side by side are a person. The rays come in order, so that one pas
 them does what a general clustering would take a distance matrix for.
 """
 
-from math import cos, hypot, sin
+from math import asin, atan2, cos, hypot, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,11 +15,18 @@ import numpy as np
 from plants.turtlebot.lidar import RAYS, STEP
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import compiled
-from systems.common.signal import reader
+from systems.common.signal import reader, row_writer, size
 from systems.perception.grid import stands
 
+CUSP = 0.05
+"""Depth of a notch between two things [m]: a body bulges, it has none."""
 MOST = 80
 """Clusters of a scan."""
+
+
+SEEN, RIGHT, LEFT, BETWEEN, LEG = range(5)
+"""What something nearer hides of a cluster: nothing, its right, its left, both; of a
+person one leg."""
 
 
 class Cluster(NamedTuple):
@@ -28,11 +35,15 @@ class Cluster(NamedTuple):
     x: float
     y: float
     radius: float
-    hidden: float  # 1 if something nearer may hide a part of it
+    hidden: float  # one of the above
     known: float  # 1 if most of it belongs to what was there before
+    near: float  # range of its nearest part, m
+    right: float  # bearings of its ends in the world, rad
+    left: float
 
 
-read_cluster = reader(Cluster)
+read_cluster, write_cluster = reader(Cluster), row_writer(Cluster)
+CLUSTER_SIZE = size(Cluster)
 
 
 @compiled
@@ -70,8 +81,10 @@ def circle_of(
             gap = hypot(place.x + r * cos(a) - x, place.y + r * sin(a) - y)
             radius = max(radius, gap - 0.05)
     before, after = scan[(first - 1) % RAYS, 0], scan[(last + 1) % RAYS, 0]
-    hidden = 0.0 < before < near or 0.0 < after < near
-    return Cluster(x, y, radius, 1.0 if hidden else 0.0, known)
+    hidden = 1.0 * (0.0 < before < near) + 2.0 * (0.0 < after < near)
+    right = place.theta + (first - 0.25) * STEP
+    left = place.theta + (last + 0.25) * STEP
+    return Cluster(x, y, radius, hidden, known, near, right, left)
 
 
 @compiled
@@ -86,7 +99,7 @@ def clusters(
         place: Where the robot is.
         scan: Rows of `Ray`.
     """
-    found = np.empty((MOST, 5))
+    found = np.empty((MOST, CLUSTER_SIZE))
     count = 0
     # Begin behind the widest jump, so that no cluster is cut by the scan's seam.
     start, widest = 0, -1.0
@@ -101,11 +114,19 @@ def clusters(
             continue
         first, last, r = k, k, scan[k % RAYS, 0]
         known = total = 0
+        low, peak, cusp = r, r, k
         while k < end and k - last <= 2:  # one dropout ends no cluster
             s = scan[k % RAYS, 0]
             if s > 0.0:
                 if abs(s - r) > params.jump + 2.0 * STEP * min(s, r):
                     break
+                if peak - low > CUSP and peak - s > CUSP:
+                    last = cusp  # two that touch, or the corner of a room
+                    break
+                if s < low:
+                    low, peak, cusp = s, s, k
+                elif s > peak:
+                    peak, cusp = s, k
                 last, r = k, s
                 a = place.theta + k * STEP
                 total += 1
@@ -120,9 +141,7 @@ def clusters(
         away = hypot(circle.x - place.x, circle.y - place.y)
         if circle.radius > params.largest or away > params.farthest:
             continue
-        found[count, 0], found[count, 1] = circle.x, circle.y
-        found[count, 2], found[count, 3] = circle.radius, circle.hidden
-        found[count, 4] = circle.known
+        write_cluster(found, count, circle)
         count += 1
     return people(params, found[:count]) if params.person > 0.0 else found[:count]
 
@@ -133,30 +152,65 @@ def people(params: Any, found: np.ndarray) -> np.ndarray:
     n = len(found)
     leg = np.zeros(n, np.bool_)
     for i in range(n):
-        leg[i] = found[i, 2] <= params.leg
+        leg[i] = read_cluster(found[i]).radius <= params.leg
     rows = np.empty_like(found)
     count = 0
     for i in range(n):
-        if not leg[i]:
-            if found[i, 2] > 0.0:
-                rows[count] = found[i]
-                rows[count, 2] = max(found[i, 2], params.person)
-                count += 1
-            continue
+        c = read_cluster(found[i])
+        if c.radius == 0.0:
+            continue  # a second leg
         mate, least = -1, params.apart
         for j in range(i + 1, n):
-            gap = hypot(found[i, 0] - found[j, 0], found[i, 1] - found[j, 1])
-            if leg[j] and gap < least:
+            o = read_cluster(found[j])
+            gap = hypot(c.x - o.x, c.y - o.y)
+            if leg[i] and leg[j] and o.radius > 0.0 and gap < least:
                 mate, least = j, gap
-        rows[count] = found[i]
-        rows[count, 2] = params.person
-        rows[count, 3] = 1.0  # one leg hides the other, and neither is the middle
+        x, y, hidden, known = c.x, c.y, c.hidden, c.known
         if mate >= 0:
-            leg[mate] = False
-            rows[count, 0] = 0.5 * (found[i, 0] + found[mate, 0])
-            rows[count, 1] = 0.5 * (found[i, 1] + found[mate, 1])
-            rows[count, 3] = max(found[i, 3], found[mate, 3])
-            rows[count, 4] = min(found[i, 4], found[mate, 4])
-            found[mate, 2] = 0.0
+            o = read_cluster(found[mate])
+            x, y, known = 0.5 * (x + o.x), 0.5 * (y + o.y), min(known, o.known)
+            hidden = 1.0 * SEEN
+            nobody = Cluster(o.x, o.y, 0.0, o.hidden, o.known, o.near, o.right, o.left)
+            write_cluster(found, mate, nobody)
+        elif leg[i]:
+            hidden = 1.0 * LEG
+        radius = max(c.radius, params.person)
+        person = Cluster(x, y, radius, hidden, known, c.near, c.right, c.left)
+        write_cluster(rows, count, person)
         count += 1
     return rows[:count]
+
+
+@compiled
+def seen_as(
+    params: Any, place: RobotState, c: Cluster, x: float, y: float, radius: float
+) -> tuple[float, float, float]:
+    """Where a cluster's circle is if it is a part of a known one, and how sure.
+
+    What is half hidden is a tangent to the other half, not a smaller circle.
+
+    Args:
+        params: A record of `TrackingParams`.
+        place: Where the robot is.
+        c: The cluster.
+        x: Of the known circle [m].
+        y: Of the known circle [m].
+        radius: Of the known circle [m].
+
+    Returns:
+        x, y, and the standard deviation [m].
+    """
+    if c.hidden == SEEN:
+        return c.x, c.y, params.noise
+    if c.hidden == LEG or c.radius >= radius:
+        return c.x, c.y, params.hidden_noise
+    d = c.near + radius
+    phi = asin(radius / d)
+    if c.hidden == RIGHT:
+        bearing = c.left - phi
+    elif c.hidden == LEFT:
+        bearing = c.right + phi
+    else:  # it is between them, and as far across as it was thought to be
+        bearing = atan2(y - place.y, x - place.x)
+    x, y = place.x + d * cos(bearing), place.y + d * sin(bearing)
+    return x, y, 0.5 * (params.noise + params.hidden_noise)

@@ -77,6 +77,11 @@ def absorb(
         c = cell_of(params, x, y)
         if c < 0 or walks(moving, x, y, 0.15):
             continue
+        if new[c, 0] >= RELIABLE:  # else the map would follow the place's errors
+            if not hit[c]:
+                new[c, 0] = min(new[c, 0] + HIT, MOST)
+            hit[c] = True
+            continue
         known = new[c, 0] > 0.0
         hits = new[c, 0] / HIT if known else 0.0
         gain = 1.0 / (1.0 + hits) if not hit[c] or hits < 1.5 else 0.02
@@ -90,8 +95,9 @@ def absorb(
         # What nothing comes back from is far away, or a dropout, which is rare.
         far = params.clear if r == 0.0 else min(r - 0.2, params.clear)
         ex, ey = cos(place.theta + k * STEP), sin(place.theta + k * STEP)
-        for half in range(int(far / (0.5 * params.cell))):
-            along = (half + 0.5) * 0.5 * params.cell
+        # Two rays a cell at three metres: what a ray steps over its neighbours find.
+        for step in range(int(far / (0.8 * params.cell))):
+            along = (step + 0.5) * 0.8 * params.cell
             j = cell_of(params, place.x + along * ex, place.y + along * ey)
             if j < 0 or hit[j] or passed[j]:
                 continue

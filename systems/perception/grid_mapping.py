@@ -31,7 +31,7 @@ class GridMappingParams:
     x: float = parameter(0.0, "of the grid's middle", "m", least=-100.0, most=100.0)
     y: float = parameter(0.0, "of the grid's middle", "m", least=-100.0, most=100.0)
     clear: float = parameter(
-        8.0, "how far a ray tells that nothing stands", "m", above=0.0, most=100.0
+        6.0, "how far a ray tells that nothing stands", "m", above=0.0, most=100.0
     )
     way_error: float = parameter(
         0.02, "of odometry after a metre", "m", above=0.0, most=1.0
@@ -40,11 +40,14 @@ class GridMappingParams:
         0.002, "of its heading after a metre or a radian", "rad", above=0.0, most=1.0
     )
     match_error: float = parameter(
-        0.35,
+        0.3,
         "of a point on a straight line; neighbours share errors, so it is beyond noise",
         "m",
         above=0.0,
         most=1.0,
+    )
+    map_error: float = parameter(
+        0.015, "of the map itself, which no scan betters", "m", least=0.0, most=1.0
     )
 
 
@@ -104,6 +107,7 @@ class GridMapping(Block):
         params = params or GridMappingParams()
         check(params)
         self._constants = constants(params)
+        self._map_error = params.map_error
         self._reckoned = self.signal_in("reckoned", RobotState)
         self._scan = self.signal_in("scan", SCAN)
         self._moving = self.signal_in("moving", MOVING)
@@ -128,7 +132,8 @@ class GridMapping(Block):
 
     def _calc_sureness(self, context: Any) -> list[float]:
         belief = Belief(*self._state(context, self._belief).tolist())
-        return [sqrt(max(v, 0.0)) for v in (belief.xx, belief.yy, belief.tt)]
+        map_ = self._map_error**2
+        return [sqrt(belief.xx + map_), sqrt(belief.yy + map_), sqrt(belief.tt)]
 
     def _update(self, context: Any) -> Sequence[Any]:
         return mapped(

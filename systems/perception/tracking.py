@@ -9,7 +9,7 @@ what the robot has seen to stand it does not forget.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, hypot, inf, isfinite
+from math import atan2, cos, hypot, inf, isfinite, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,12 +22,13 @@ from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import reader, row_writer, size
-from systems.perception.clusters import clusters, read_cluster
-from systems.perception.grid import standing
+from systems.perception.clusters import LEG, clusters, read_cluster, seen_as
+from systems.perception.clusters import SEEN as WHOLE
+from systems.perception.grid import standing, stands
 from systems.perception.grid_mapping import SCAN_PERIOD, GridMappingParams
 from systems.perception.grid_mapping import constants as grid_constants
 from systems.perception.signals import GRID, MOVING
-from systems.switching.signals import SEEN, Seen
+from systems.switching.signals import CORNERS, EDGES, SEEN, Corner, Seen
 
 
 class Track(NamedTuple):
@@ -54,7 +55,8 @@ class Track(NamedTuple):
 
 read_track, write_track = reader(Track), row_writer(Track)
 read_robot, write_seen = reader(RobotState), row_writer(Seen)
-TRACK_SIZE, SEEN_SIZE = size(Track), size(Seen)
+write_corner = row_writer(Corner)
+TRACK_SIZE, SEEN_SIZE, CORNER_SIZE = size(Track), size(Seen), size(Corner)
 NOBODY = -1.0
 FORBIDDEN = 1e6
 """Cost of a match beyond the gate."""
@@ -86,16 +88,19 @@ class TrackingParams:
         0.6, "greatest distance of a person's legs", "m", above=0.0, most=2.0
     )
     noise: float = parameter(
-        0.03, "standard deviation of a circle's place", "m", above=0.0, most=0.5
+        0.02, "standard deviation of a circle's place", "m", above=0.0, most=0.5
     )
     hidden_noise: float = parameter(
         0.1, "of one of which a part is hidden", "m", above=0.0, most=1.0
     )
     agility: float = parameter(
-        1.0, "of their accelerations, standard deviation", "m/s^2", above=0.0, most=20.0
+        2.0, "of their accelerations, standard deviation", "m/s^2", above=0.0, most=20.0
     )
     gate: float = parameter(
         4.0, "of a match, in standard deviations", above=0.0, most=20.0
+    )
+    leap: float = parameter(
+        0.4, "of nothing in a scan, whatever the gate says", "m", above=0.0, most=5.0
     )
     memory: float = parameter(
         1.5, "how long what is hidden is believed in", "s", least=0.0, most=60.0
@@ -108,6 +113,9 @@ class TrackingParams:
     )
     stops: float = parameter(
         0.04, "speed below which it stands again", "m/s", above=0.0, most=2.0
+    )
+    hides: float = parameter(
+        0.6, "depth behind an edge in which somebody may be", "m", above=0.0, most=5.0
     )
     point: float = parameter(
         0.02, "radius of a point of what stands", "m", above=0.0, most=0.5
@@ -155,20 +163,41 @@ def aged(t: Track, missed: float) -> Track:
 
 
 @compiled
-def costs(params: Any, tracks: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Squared distances in standard deviations, by track and cluster."""
+def costs(
+    params: Any, tracks: np.ndarray, found: np.ndarray, place: RobotState
+) -> np.ndarray:
+    """Squared distances in standard deviations, by track and cluster.
+
+    It is `FORBIDDEN` beyond the gate.
+    """
     table = np.full((len(tracks), len(found)), FORBIDDEN)
     for i in range(len(tracks)):
         t = read_track(tracks[i])
         for j in range(len(found)):
             if t.number > 0.0:
                 c = read_cluster(found[j])
-                sigma = params.hidden_noise if c.hidden > 0.0 else params.noise
-                dd = (t.x - c.x) ** 2 + (t.y - c.y) ** 2
+                x, y, sigma = seen_as(params, place, c, t.x, t.y, t.radius)
+                dd = (t.x - x) ** 2 + (t.y - y) ** 2
                 cost = dd / (t.pp + sigma * sigma)
-                if cost < params.gate**2 or dd < 0.01:
+                if dd < params.leap**2 and (cost < params.gate**2 or dd < 0.01):
                     table[i, j] = cost
     return table
+
+
+@compiled
+def evident(table: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Matches that have no alternative, -1 for the rest, and whether others have."""
+    mates = np.full(len(table), -1)
+    free = table < FORBIDDEN
+    chosen = False
+    for i in range(len(table)):
+        for j in range(table.shape[1]):
+            if free[i, j]:
+                if free[i].sum() == 1 and free[:, j].sum() == 1:
+                    mates[i] = j
+                else:
+                    chosen = True
+    return mates, chosen
 
 
 @compiled
@@ -207,42 +236,43 @@ def corrected(
             r = scan[k % RAYS, 0]
             through = r == 0.0 or r > d + t.radius + 0.1
             missed = t.missed + (3.0 if through else 1.0)
-            if missed * params.period > params.memory or t.hits < 3.0:
+            if missed * params.period > params.memory or t.hits < 2.0:
                 rows[i, :] = 0.0
             else:
                 write_track(rows, i, aged(t, missed))
             continue
         c = read_cluster(found[mates[i]])
         taken[mates[i]] = True
-        sigma = params.hidden_noise if c.hidden > 0.0 else params.noise
+        x, y, sigma = seen_as(params, place, c, t.x, t.y, t.radius)
         s = t.pp + sigma * sigma
         kp, kv = t.pp / s, t.pv / s
-        v_x, v_y = t.v_x + kv * (c.x - t.x), t.v_y + kv * (c.y - t.y)
+        v_x, v_y = t.v_x + kv * (x - t.x), t.v_y + kv * (y - t.y)
         speed = hypot(v_x, v_y)
         far = hypot(t.x - t.stood_x, t.y - t.stood_y) > params.strays
         if t.moves > 0.0:
             moves = speed > params.stops
         else:
             moves = t.hits >= 4.0 and (far or speed > params.starts)
-        gain = 0.05 if c.hidden > 0.0 and c.radius < t.radius else 0.3
+        gain = 0.0 if c.hidden != WHOLE and c.radius < t.radius else 0.3
         write_track(
             rows,
             i,
             Track(
                 t.number,
-                t.x + kp * (c.x - t.x),
-                t.y + kp * (c.y - t.y),
+                t.x + kp * (x - t.x),
+                t.y + kp * (y - t.y),
                 v_x,
                 v_y,
                 (1.0 - kp) * t.pp,
                 (1.0 - kp) * t.pv,
                 t.vv - kv * t.pv,
                 t.radius + gain * (c.radius - t.radius),
-                t.hits + 1.0,
+                # What comes out of a shadow grows, and only seems to move.
+                t.hits + (1.0 if c.hidden == WHOLE or c.hidden == LEG else 0.25),
                 0.0,
                 1.0 if moves else 0.0,
-                t.stood_x if moves or t.moves == 0.0 else c.x,
-                t.stood_y if moves or t.moves == 0.0 else c.y,
+                t.stood_x if moves or t.moves == 0.0 else x,
+                t.stood_y if moves or t.moves == 0.0 else y,
             ),
         )
     free = 0
@@ -260,8 +290,9 @@ def corrected(
         if inside or free == len(rows):
             continue
         last += 1.0
-        sigma = params.hidden_noise if c.hidden > 0.0 else params.noise
-        sure = (sigma**2, 0.0, 1.0, c.radius, 1.0, 0.0, 0.0)
+        sigma = params.noise if c.hidden == WHOLE else params.hidden_noise
+        hits = 1.0 if c.hidden == WHOLE or c.hidden == LEG else 0.25
+        sure = (sigma**2, 0.0, 1.0, c.radius, hits, 0.0, 0.0)
         new = Track(last, c.x, c.y, 0.0, 0.0, *sure, c.x, c.y)
         write_track(rows, free, new)
     return rows, last
@@ -315,13 +346,18 @@ def observed(
     place: np.ndarray,
     grid: np.ndarray,
     scan: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Tracks as predicted, clusters of a scan, and what each match would cost."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Tracks as predicted, clusters of a scan, and what each match would cost.
+
+    Also the matches that are `evident`, and whether there are others.
+    """
     robot = read_robot(place)
     rows, rays = grid.reshape((len(grid) // 3, 3)), scan.reshape((len(scan), 1))
     table = predicted(params[0], tracks.reshape((CAPACITY, TRACK_SIZE)), dt)
     found = clusters(params[0], rows, robot, rays)
-    return table, found, costs(params[0], table, found)
+    prices = costs(params[0], table, found, robot)
+    mates, chosen = evident(prices)
+    return table, found, prices, mates, chosen
 
 
 @compiled
@@ -361,11 +397,14 @@ def tracked(
     scan: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Tracks and stamp after another scan; all as ports and context have them."""
-    if not isfinite(place.sum() + grid.sum() + scan.sum()):
+    if not isfinite(place.sum() + scan.sum()):
         return tracks, stamp
     then, last = stamp.tolist()
-    table, found, prices = observed(params, tracks, time - then, place, grid, scan)
-    mates = matched(prices)
+    dt = time - then
+    table, found, prices, mates, chosen = observed(
+        params, tracks, dt, place, grid, scan
+    )
+    mates = matched(prices) if chosen else mates
     table, last = updated(params, table, found, mates, place, scan, last)
     return table.ravel(), np.array([time, last])
 
@@ -378,6 +417,32 @@ def constants(params: TrackingParams, mapping: GridMappingParams) -> np.ndarray:
     return packed(params, period=SCAN_PERIOD, **where)
 
 
+@compiled
+def corners(
+    params: np.ndarray, place: np.ndarray, grid: np.ndarray, scan: np.ndarray
+) -> np.ndarray:
+    """Edges of what stands, behind which somebody may be; as the port has them."""
+    p, robot = params[0], read_robot(place)
+    rows, rays = grid.reshape((len(grid) // 3, 3)), scan.reshape((len(scan), 1))
+    found = np.zeros((EDGES, CORNER_SIZE))
+    count = 0
+    for k in range(RAYS):
+        r = rays[k, 0]
+        if r == 0.0 or r > p.vision or count == EDGES:
+            continue
+        x = robot.x + r * cos(robot.theta + k * STEP)
+        y = robot.y + r * sin(robot.theta + k * STEP)
+        for side in (-1, 1):
+            open_ = True
+            for n in range(1, 4):  # a single ray may be a dropout
+                s = rays[(k + side * n) % RAYS, 0]
+                open_ = open_ and (s == 0.0 or s > r + p.hides)
+            if open_ and count < EDGES and stands(p, rows, x, y):
+                write_corner(found, count, Corner(1.0, x, y))
+                count += 1
+    return found.ravel()
+
+
 class Tracking(Block):
     """Tells what moves by its tracks, and what stands by the grid.
 
@@ -388,6 +453,7 @@ class Tracking(Block):
     Port ``grid`` accepts rows of `Cell`.
     Port ``moving`` emits rows of `Seen`, all that moves.
     Port ``seen`` emits rows of `Seen`: what moves and what stands, within sight.
+    Port ``corners`` emits rows of `Corner`: behind which somebody may be.
     """
 
     def __init__(
@@ -417,6 +483,9 @@ class Tracking(Block):
         self.signal_out("moving", MOVING, self._calc_moving, now)
         inputs = {self._place.ticket(), self._grid.ticket()}
         self.signal_out("seen", SEEN, self._calc_seen, now | inputs)
+        self.signal_out(
+            "corners", CORNERS, self._calc_corners, inputs | {self._scan.ticket()}
+        )
         self.update_every(SCAN_PERIOD, self._update)
 
     def _state(self, context: Any, group: int) -> np.ndarray:
@@ -434,6 +503,10 @@ class Tracking(Block):
     def _calc_seen(self, context: Any) -> np.ndarray:
         place, grid = self._place.Eval(context), self._grid.Eval(context)
         return sight(self._constants, *self._now(context), place, grid)
+
+    def _calc_corners(self, context: Any) -> np.ndarray:
+        place, grid = self._place.Eval(context), self._grid.Eval(context)
+        return corners(self._constants, place, grid, self._scan.Eval(context))
 
     def _update(self, context: Any) -> Sequence[Any]:
         return tracked(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from plants.crowd.walls import wall_distance
-from systems.switching.signals import Seen
+from systems.switching.signals import Corner, Seen
 from systems.switching.unicycle_control import (
     UnicycleControlParams,
     constants,
@@ -21,8 +21,8 @@ from tests.benchmarks.sensed import Sensed, Senses
 Command = tuple[float, float, bool]
 """Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
 
-Step = Callable[[float, float, float, float, float, list[Seen]], Command]
-"""(x, y, heading, v_x, v_y, obstacles in sight) -> what to do."""
+Step = Callable[[float, float, float, float, float, list[Seen], list[Corner]], Command]
+"""(x, y, heading, v_x, v_y, obstacles in sight, corners) -> what to do."""
 
 REACH = 0.2
 """Of the true goal [m], for a robot that only believes to be there."""
@@ -125,12 +125,12 @@ def run(
                 for i, (a, b, r, u, v) in enumerate(frame)
                 if hypot(a - x, b - y) <= robot.vision
             ]
-            place = (x, y, theta)
+            place, hiding = (x, y, theta), []
         else:
-            place, seen = sensed.at((x, y, theta), (vx, vy), frame, k * dt)
+            place, seen, hiding = sensed.at((x, y, theta), (vx, vy), frame, k * dt)
         astray = max(astray, hypot(place[0] - x, place[1] - y))
         start = perf_counter()
-        wanted = step(*place, vx, vy, seen)
+        wanted = step(*place, vx, vy, seen, hiding)
         walls.append(perf_counter() - start)
         if robot.holonomic:
             size = hypot(wanted[0], wanted[1])

@@ -5,7 +5,7 @@ computed beforehand. Every suite is a function of a seed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 import itertools
 from math import cos, hypot, pi, sin
@@ -346,6 +346,17 @@ def crowd_5(seed: int, count: int = 500) -> list[Scene]:
 def crowd_20(seed: int, count: int = 200) -> list[Scene]:
     """CrowdNav circle crossing, twenty humans to whom the robot is invisible."""
     return _crowd(seed, 20, count)
+
+
+def in_hall(scene: Scene, half: float = 9.8) -> Scene:
+    """The same world in a hall, by whose walls a robot can find its place.
+
+    What moves goes through them.
+    """
+    x, y = (0.5 * (a + b) for a, b in zip(scene.start, scene.goal, strict=True))
+    low_x, high_x, low_y, high_y = x - half, x + half, y - half, y + half
+    corners = [[low_x, low_y], [high_x, low_y], [high_x, high_y], [low_x, high_y]]
+    return replace(scene, walls=[WallParams([*corners, corners[0]])])
 
 
 SUITES: dict[str, Callable[..., list[Scene]]] = {

@@ -26,12 +26,13 @@ from systems.perception.tracking import (
     CAPACITY,
     TRACK_SIZE,
     TrackingParams,
+    corners,
     sight,
     tracked,
     walking,
 )
 from systems.perception.tracking import constants as tracking_constants
-from systems.switching.signals import Seen
+from systems.switching.signals import Corner, Seen
 from tests.benchmarks.navigation_scenes import Frame, Scene
 
 Pose = tuple[float, float, float]
@@ -69,8 +70,8 @@ class Sensed:
 
     def at(
         self, pose: Pose, velocity: tuple[float, float], frame: Frame, time: float
-    ) -> tuple[Pose, list[Seen]]:
-        """Where the robot believes to be at a time, and what it sees.
+    ) -> tuple[Pose, list[Seen], list[Corner]]:
+        """Where the robot believes to be at a time, what it sees and what it does not.
 
         Between two calls scans are taken at least `SCAN_PERIOD` apart, and everybody
         goes straight.
@@ -99,7 +100,10 @@ class Sensed:
         rows = sight(self.k_tracking, self.tracks, dt, place, self.grid)
         rows = rows.reshape(-1, size(Seen))
         seen = [Seen(*row) for row in rows[rows[:, 0] >= 0.0].tolist()]
-        return tuple(place[:3].tolist()), seen
+        edges = corners(self.k_tracking, place, self.grid, self.scan)
+        edges = edges.reshape(-1, size(Corner))
+        hiding = [Corner(*row) for row in edges[edges[:, 0] > 0.0].tolist()]
+        return tuple(place[:3].tolist()), seen, hiding
 
     def _reckon(self, robot: RobotState) -> None:
         noise = OdometryNoise(*self.rng.standard_normal(4).tolist())
@@ -110,7 +114,7 @@ class Sensed:
         rows = np.reshape(np.array(frame, float), (-1, size(Obstacle)))
         noise = self.rng.standard_normal((RAYS, 2))
         (scan,) = scan_of(self.k_lidar[0], robot, rows, noise)
-        scan = scan.ravel()
+        self.scan = scan = scan.ravel()
         place = place_now(self.belief, self.reckoned)
         dt = time - self.stamp[0]
         moving = walking(self.k_tracking, self.tracks, dt)
