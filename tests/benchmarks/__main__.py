@@ -9,6 +9,7 @@ from tests.benchmarks import (
     gauze_speed,
     kinematic_scenes,
     resection_speed,
+    sensed_suite,
     snake_speed,
     switching_suite,
     wrist_step,
@@ -23,6 +24,7 @@ BENCHMARKS = {
     "snake": snake_speed,
     "resection": resection_speed,
     "switching": switching_suite,
+    "sensed": sensed_suite,
     "wrist-step": wrist_step,
     "wrist": wrist_sweep,
 }
