@@ -173,7 +173,9 @@ def make_blocks(case: KeyholeCase, posture: Any) -> dict[str, Any]:
         "phases": OperationPhases(s.phases),
         "tube_task": TubeTask(s.tube_task, s.robot.p_WP, s.entry.p_WE, s.axis.tolist()),
         "snake_task": task,
-        "tube_location": TubeLocation(tube_known),
+        "tube_location": TubeLocation(
+            tube_known, posture.tolist(), s.arm, s.joints.period
+        ),
         "robot_location": RobotLocation(tube_known),
         "joint_commands": JointCommands(s.joints, posture.tolist(), s.arm, tube_known),
         "snake_in_organ": SnakeInOrgan(

@@ -50,9 +50,9 @@ class WireInverseActuationParams:
 
 
 @compiled
-def _wound(c: Any, x: np.ndarray) -> np.ndarray:
+def _wound(constants: np.ndarray, x: np.ndarray) -> np.ndarray:
     """Drum positions of wires that do not stretch."""
-    lifted = np.empty((1, len(x)))
+    c, lifted = constants[0], np.empty((1, len(x)))
     lifted[0, 0] = x[0] - c.load / c.travel_kp
     h, g = c.half_pitch, c.gravity
     masses = (c.ball_mass, c.plate_mass, c.tool_mass)
@@ -85,7 +85,7 @@ def winding(
             tool_offset=snake.tool_offset,
             ball_radius=snake.ball_radius,
             plate_thickness=snake.plate_thickness,
-        )[0]
+        )
         return lambda x: _wound(c, x)
 
     def stretched(x: np.ndarray) -> np.ndarray:

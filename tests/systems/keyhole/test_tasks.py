@@ -5,6 +5,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 import pytest
 
+from plants.arm.arm import servo_step
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
 from plants.instruments.tube import TubeParams
@@ -31,14 +32,15 @@ def test_tube_pose_is_the_plants():
     context = plant.CreateDefaultContext()
     dut = TubeLocation(tube)
     own = dut.CreateDefaultContext()
+    A, C = servo_step(plant, READY_POSTURE, None, 1 / 120)
     for _ in range(5):
-        q = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
-        lag, step = rng.uniform(-0.01, 0.01, (2, 7))
-        dut.GetInputPort("arm_state").FixValue(own, np.append(q, np.zeros(7)))
-        dut.GetInputPort("posture").FixValue(own, q + lag)
-        dut.GetInputPort("next").FixValue(own, q + lag + step)
+        q_d = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
+        lag, step, v = rng.uniform(-0.01, 0.01, (3, 7))
+        dut.GetInputPort("arm_state").FixValue(own, [*(q_d + lag), *v])
+        dut.GetInputPort("posture").FixValue(own, q_d)
+        dut.GetInputPort("next").FixValue(own, q_d + step)
         seen = view(TubePose, np.array(dut.GetOutputPort("tube").Eval(own)))
-        plant.SetPositions(context, q + step)
+        plant.SetPositions(context, q_d + step + A @ lag + C @ (v / 120 - step))
         X = plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(context)
         np.testing.assert_allclose(seen.p, X.translation(), atol=1e-12)
         np.testing.assert_allclose(seen.x, X.rotation().col(0), atol=1e-12)
