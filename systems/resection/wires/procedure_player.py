@@ -191,16 +191,28 @@ def schedule(
     return profile(x, params, waits).times
 
 
+@compiled
 def posture_at(
-    x: NDArray[np.float64], times: NDArray[np.float64], time: float
-) -> NDArray[np.float64]:
-    """The posture (7,) at a time in s, of postures (n, 7) reached at times (n,)."""
-    n = int(np.searchsorted(times, time))
+    x: Any, times: Any, full: Any, v: Any, waits: Any, turn: float, time: float
+) -> Any:
+    """The posture (7,) at a time in s, speeding up and slowing down between two.
+
+    Args:
+        x: Postures (n, 7).
+        times: As `Profile` has them, and so on.
+        full: If it is zero, a way is gone at an even speed.
+        v: Speeds.
+        waits: Waits.
+        turn: Time from rest to full speed in s.
+        time: Of the posture.
+    """
+    n = np.searchsorted(times, time)
     if n == 0 or n == len(times):
-        return x[min(n, len(x) - 1)]
-    share = (time - times[n - 1]) / (times[n] - times[n - 1])
-    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
-    return between
+        return x[min(n, len(x) - 1)].copy()
+    begin = times[n - 1] + waits[n - 1]
+    share = max(time - begin, 0.0) / (times[n] - begin)
+    share = way_share(full[n - 1], v[n - 1], v[n], turn, share)
+    return x[n - 1] + share * (x[n] - x[n - 1])
 
 
 def played(
@@ -209,17 +221,10 @@ def played(
     params: ProcedurePlayerParams,
     time: float,
 ) -> NDArray[np.float64]:
-    """The posture (7,) at a time in s, speeding up and slowing down between two."""
-    times, full, v, waits = profile
-    n = int(np.searchsorted(times, time))
-    if n == 0 or n == len(times):
-        return x[min(n, len(x) - 1)]
-    begin = times[n - 1] + waits[n - 1]
-    share = max(time - begin, 0.0) / (times[n] - begin)
+    """The posture (7,) at a time in s of a profile, see `posture_at`."""
     turn = max(params.turn, params.lead)
-    share = way_share(full[n - 1], v[n - 1], v[n], turn, share)
-    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
-    return between
+    posture: NDArray[np.float64] = posture_at(x, *profile, turn, time)
+    return posture
 
 
 class ProcedurePlayer(Block):
