@@ -19,6 +19,8 @@ from diagrams.gauze.tools import (
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
+from plants.organs.organ_touch import OrganTouchParams
+from plants.organs.organs import Organ
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
 from systems.auto_guidance.backward_movement import BackwardMovementParams
@@ -60,8 +62,11 @@ class GauzeScenario(Scenario, WristSettings):
     )
     robot: ToolAtStart = part(ToolAtStart)
     tools: list[Tool] = field(default_factory=usual_tools)
+    organs: list[Organ] = parameter([], "of the patient", shape=(-1,))
+    organ_touch: OrganTouchParams = part(OrganTouchParams)
     time_ratio: bool = parameter(
-        False, "whether it is run without O as well, for the figure `time_ratio`"
+        False,
+        "whether it is run without O, and organs, as well, for the figure `time_ratio`",
     )
     compare: bool = parameter(
         False, "whether the paper's planner is run as well and drawn beside it"
@@ -135,7 +140,7 @@ def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
         withdrawn(t) if isinstance(t, HandTool) and t.role == OBSTACLE else t
         for t in scenario.tools
     ]
-    return found | {WITHOUT_OBSTACLE: replace(alone, tools=tools)}
+    return found | {WITHOUT_OBSTACLE: replace(alone, tools=tools, organs=[])}
 
 
 def withdrawn(tool: HandTool) -> HandTool:
@@ -157,11 +162,12 @@ def check(scenario: GauzeScenario) -> None:
 
 def check_tools(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for tools that cannot be."""
-    names = [tool.name for tool in scenario.tools]
+    names = [one.name for one in (*scenario.tools, *scenario.organs)]
     for name in names:
         if names.count(name) > 1 or not name.isidentifier():
             raise ScenarioError(
-                f"tools={names}: expected names that differ, of letters, digits and _"
+                f"tools and organs {names}: expected names that differ, of letters, "
+                "digits and _"
             )
     for role in (TARGET, CAMERA):
         if len(scenario.of_role(role)) != 1:
