@@ -256,8 +256,11 @@ def wiring(
         wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
         exports |= WRIST_EXPORTS
     if scenario.organs:
-        wires += [wire for wire in inside.WIRES if has_input(systems, wire[1])]
-        exports |= inside.EXPORTS
+        wires = inside.wired(scenario, wires)
+        wires = [wire for wire in wires if has_input(systems, wire[1])]
+        exports |= inside.EXPORTS | (
+            inside.PRESS_EXPORTS if scenario.press.active else {}
+        )
     wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)
@@ -290,5 +293,7 @@ def make_gauze_diagram(
         systems |= inside.add_organs(builder, scenario, theatre, organs)
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
+    if organs is not None and scenario.press.active:
+        systems |= inside.add_press(builder, scenario, organs)
     wires, exports = wiring(scenario, systems)
     return finish(builder, "gauze_delivery", systems, wires, exports, scenario.faults)

@@ -15,7 +15,7 @@ from pydrake.systems.primitives import (
 from plants.abdomen.organ_motion import OrganMotionParams, organ_trajectory
 from plants.abdomen.wall_motion import WallMotionParams
 from plants.instruments.instrument import GAUZE_RADIUS
-from plants.organs.distance_grid import ERROR, DistanceGrid, kept
+from plants.organs.distance_grid import ERROR, SPACING, DistanceGrid, kept
 from plants.organs.reading import UNITS, read_surface
 from plants.organs.shapes import DETAIL, SHAPES, shape
 from plants.organs.surface import Surface, refuse_open, refuse_size
@@ -80,6 +80,12 @@ class OrganSet(NamedTuple):
     names: tuple[str, ...]
     values: np.ndarray
     table: np.ndarray
+
+    @classmethod
+    def nothing(cls) -> "OrganSet":
+        """One organ that is nowhere near: a block alone has it."""
+        row = [100.0, 100.0, 100.0, SPACING, 2, 2, 2, 0, 0.0, 0.0]
+        return cls(("organ",), np.ones((1, 8), np.float32), np.array([[row]]))
 
 
 def arrays(organs: OrganSet | None) -> list[np.ndarray]:
