@@ -14,9 +14,11 @@ from pydrake.systems.primitives import (
 
 from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
+from diagrams.gauze import organs as inside
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from diagrams.gauze.tools import OBSTACLE, HandTool, hands
+from plants.organs.organs import OrganSet
 from plants.surgeon.hunting_tool import HuntingTool
 from plants.surgeon.surgeon_tool import SurgeonTool
 from systems.auto_guidance.backward_movement import BackwardMovement
@@ -186,12 +188,15 @@ def aliases(scenario: GauzeScenario) -> dict[str, str]:
     }
 
 
-def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
+def make_blocks(
+    scenario: GauzeScenario, posture: Any, organs: OrganSet | None = None
+) -> dict[str, Any]:
     """The blocks of the diagram, by the names that `WIRES` uses.
 
     Args:
         scenario: The parameters.
         posture: Joint positions at the start (7) [rad].
+        organs: What blocks get of the organs; None without any.
     """
     s = scenario
     tools = hands(s.tools, s.seed)
@@ -205,14 +210,14 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         ),
         "endoscope": Endoscope(s.camera),
         "robot_location": RobotLocation(s.instrument),
-        "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles=obstacles)
+        "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles, organs)
         if s.behaviour == "bypass"
         else GoToTarget(s.go_to_target, obstacles),
         "velocity_corrections": VelocityCorrections(s.velocity_corrections, obstacles),
         "backward_movement": BackwardMovement(s.backward_movement, obstacles),
         "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter, obstacles),
         "clearance_constraint": ClearanceConstraint(
-            s.clearance_constraint, *around, obstacles=obstacles
+            s.clearance_constraint, *around, obstacles, organs
         ),
         "tool_navigation": ToolNavigation(
             s.navigation, s.robot.p_WP, s.robot.p_WG, obstacles
@@ -250,6 +255,12 @@ def wiring(
     if scenario.emulated:
         wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
         exports |= WRIST_EXPORTS
+    if scenario.organs:
+        wires = inside.wired(scenario, wires)
+        wires = [wire for wire in wires if has_input(systems, wire[1])]
+        exports |= inside.EXPORTS | (
+            inside.PRESS_EXPORTS if scenario.press.active else {}
+        )
     wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)
@@ -274,9 +285,15 @@ def make_gauze_diagram(
     """
     builder = DiagramBuilder()
     theatre = add_theatre(builder, scenario)
-    blocks = add_blocks(builder, make_blocks(scenario, theatre.posture), swaps)
+    organs = inside.known_organs(scenario)
+    made = make_blocks(scenario, theatre.posture, organs)
+    blocks = add_blocks(builder, made, swaps)
     systems = theatre.systems | blocks
+    if organs is not None:
+        systems |= inside.add_organs(builder, scenario, theatre, organs)
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
+    if organs is not None and scenario.press.active:
+        systems |= inside.add_press(builder, scenario, organs)
     wires, exports = wiring(scenario, systems)
     return finish(builder, "gauze_delivery", systems, wires, exports, scenario.faults)

@@ -11,6 +11,7 @@ from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
+from diagrams.gauze.organs import organ_signals
 from diagrams.gauze.plots import plots
 from diagrams.gauze.scenario import GauzeScenario, check, companions
 from diagrams.gauze.tools import OBSTACLE, gather, hands, in_the_way, logged
@@ -70,6 +71,7 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
         for port, kind in SIGNALS.items()
     }
     ports |= WRIST_SIGNALS if scenario.emulated else {}
+    ports |= organ_signals(scenario)
     if scenario.behaviour != "bypass":
         del ports["planner.way"]
     return ports
