@@ -36,7 +36,7 @@ class TubeStatus(NamedTuple):
 class BodyDeviation(NamedTuple):
     """How far the snake's body is from its plan, because the tube is from its own."""
 
-    distance: Annotated[float, Field("m", "of a ball in the organ, at the most", 2e-5)]
+    distance: Annotated[float, Field("m", "of what is in the organ, at the most", 2e-5)]
 
 
 class SnakeStatus(NamedTuple):

@@ -223,7 +223,7 @@ def _tool(c: Any, plan: Any, now: Way) -> ToolTarget:
 def body_deviation(
     x: Floats, C: Pose, E: Pose, h: float, tool: float, bend: float
 ) -> float:
-    """How far the balls in the organ are from where a posture has them, in m.
+    """How far the body in the organ is from where a posture has it, in m.
 
     The inverse kinematics keeps tool and intermediate axis where they are to be in E,
     so what lies before them bends otherwise once C and E are apart.
@@ -243,12 +243,16 @@ def body_deviation(
     if solve_tool(*axes, h, tool, bend, (-1.0, 1.0), q) != REACHED:
         return FAR
     corners(q, h, tool, b)
-    most = 0.0
+    most, before = 0.0, (0.0, 0.0, 0.0)
     for i in range(POINTS - 1):
+        in_W = plus(C.p, outwards(C, row_of(b, i)))
+        off = sub(inwards(E, sub(in_W, E.p)), row_of(a, i))
         if a[i, 2] > 0.0:
-            in_W = plus(C.p, outwards(C, row_of(b, i)))
-            there = inwards(E, sub(in_W, E.p))
-            most = max(most, norm(sub(there, row_of(a, i))))
+            if i > 0 and a[i - 1, 2] < 0.0:  # where the body passes the entry
+                share = -a[i - 1, 2] / (a[i, 2] - a[i - 1, 2])
+                most = norm(along(before, share, sub(off, before)))
+            most = max(most, norm(off))
+        before = off
     return most
 
 
