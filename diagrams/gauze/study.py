@@ -33,6 +33,7 @@ from systems.common.signals import (
     ViewCone,
 )
 from systems.motion.joint_commands import Status
+from systems.motion.sight import Sight
 from systems.motion.tool_navigation import StopCode
 
 SIGNALS = {
@@ -72,6 +73,8 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
     }
     ports |= WRIST_SIGNALS if scenario.emulated else {}
     ports |= organ_signals(scenario)
+    if scenario.camera_planner.active:
+        ports["camera.sight"] = Sight
     if scenario.behaviour != "bypass":
         del ports["planner.way"]
     return ports
