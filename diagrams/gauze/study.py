@@ -9,6 +9,7 @@ from diagrams.bedside.wrist import WRIST_SIGNALS
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
+from diagrams.gauze import film
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.organs import organ_signals
@@ -116,6 +117,8 @@ STUDY = Study(
     controller="tool_navigation",
     adjust=stiffen,
     companions=companions,
+    can_film=film.refuse_without_egl,
+    film=film.save_film,
     required=(
         "system",
         "duration",
