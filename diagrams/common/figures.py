@@ -95,6 +95,13 @@ FIGURES = {
     "mode_switches": Figure("", "changes between the two potentials"),
     "outrun_time": Figure("s", "with a faster obstacle too near to be avoided"),
     "faster_obstacles": Figure("", "obstacles that outran the robot"),
+    "goal_miss": Figure("m", "of the true place from the goal at the end"),
+    "max_place_error": Figure("m", "greatest of the believed place"),
+    "max_heading_error": Figure("rad", "greatest of the believed heading"),
+    "place_within_3_sigma": Figure("%", "share of the time it is as sure as it says"),
+    "walkers_tracked": Figure("%", "of who moves within the vision, hidden or not"),
+    "median_track_error": Figure("m", "of the tracks' places"),
+    "median_track_velocity_error": Figure("m/s", "of the tracks' velocities"),
     # snake
     "max_pose_error": Figure("m", "of the tool, greatest"),
     "rms_pose_error": Figure("m", "the same, rms"),

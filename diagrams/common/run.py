@@ -45,6 +45,9 @@ from systems.common.stopwatch import STOPWATCH
 INTERRUPTED = "interrupted"
 """Error of a run that was interrupted."""
 
+LOOKS = 8
+"""One frame in so many is watched by the stopwatch."""
+
 LARGEST_LOG = 2e9
 """Of a run, in bytes."""
 
@@ -294,6 +297,7 @@ def advance(
     station = run.diagram.GetSubsystemByName("station")
     time, frame = 0.0, 0
     while time < duration:
+        STOPWATCH.look(frame % LOOKS == 0, time if frame else -1.0)
         frame += 1
         time = min(frame * period, duration)
         run.study.adjust(run.case, station, simulator.get_mutable_context())

@@ -72,7 +72,7 @@ KEYHOLE_WIRES = (
     *DRUM_WIRES,
     # What is true of it in the organ.
     ("snake_location.posture", "snake_in_organ.posture"),
-    ("plant.body_poses", "snake_in_organ.body_poses"),
+    ("wrist_sensor.mount", "snake_in_organ.mount"),
     ("organ_motion.y0", "snake_in_organ.entry"),
 )
 
@@ -143,13 +143,12 @@ def known_tube(scenario: KeyholeScenario) -> TubeParams:
     return replace(scenario.instrument, gauze_mass=mass)
 
 
-def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
+def make_blocks(case: KeyholeCase, posture: Any) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use.
 
     Args:
         case: The parameters and the plan.
         posture: Joint positions at the start (7) [rad].
-        tube: Place of the tube's body in the plant's `body_poses`.
     """
     s, o, snake = case.scenario, case.scenario.operation, case.scenario.in_tube
     task = SnakeTask(
@@ -174,11 +173,13 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
         "phases": OperationPhases(s.phases),
         "tube_task": TubeTask(s.tube_task, s.robot.p_WP, s.entry.p_WE, s.axis.tolist()),
         "snake_task": task,
-        "tube_location": TubeLocation(tube_known),
+        "tube_location": TubeLocation(
+            tube_known, posture.tolist(), s.arm, s.joints.period
+        ),
         "robot_location": RobotLocation(tube_known),
         "joint_commands": JointCommands(s.joints, posture.tolist(), s.arm, tube_known),
         "snake_in_organ": SnakeInOrgan(
-            snake, tube, s.instrument.length + s.instrument.gap, s.R_WE
+            snake, s.instrument.length + s.instrument.gap, s.R_WE
         ),
     }
     if case.resection is not None:
@@ -217,8 +218,7 @@ def make_keyhole_diagram(
 
     bedside = add_bedside(builder, s, hang)
     plant = bedside.systems["plant"]
-    tube = int(bedside.instrument.body.index())
-    own = make_blocks(case, bedside.posture, tube)
+    own = make_blocks(case, bedside.posture)
     if s.others:
         add_theatre(builder, s.surgeon, bedside)
         planner = gauze.make_blocks(s.surgeon, bedside.posture)

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, replace
 import math
+from typing import Any
 
 import numpy as np
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import WristSettings, check_wrist
+from diagrams.bedside.wrist import WristSettings
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
 from diagrams.gauze.tools import CameraTool
@@ -30,14 +31,23 @@ from systems.keyhole.snake_task import SnakeTaskParams
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.wrist_law import WristParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
 from systems.resection.wires.wire_drums import WireDrumsParams
 from systems.sensing.optical_tracker import MarkerBody, OpticalTrackerParams
 from systems.sensing.organ_estimator import OrganEstimatorParams
+from systems.sensing.tool_wrench import ToolWrenchParams
+from systems.sensing.wrench_watch import WrenchWatchParams
 
 TASKS = ("circle", "resect")
-PERIOD = 1.0 / 120.0
+PERIOD = 1.0 / 60.0
+"""Of all blocks, the tracker's."""
+CLOCKED = (
+    *("joints", "operation", "organ_estimator", "phases", "tube_task", "snake_task"),
+    *("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"),
+)
+"""Blocks that share their instants."""
 BASE = 2e-3
 """How far the snake's base may stand within the tube at work, in m."""
 TURN = 120
@@ -86,7 +96,7 @@ class OrganOperation(ResectionScenario):
     )
     period: float = parameter(
         PERIOD,
-        "of drums and inverse kinematics, the wrist's",
+        "of drums and inverse kinematics, the joints'",
         "s",
         least=1e-3,
         most=0.1,
@@ -124,6 +134,7 @@ class SteadyFulcrum(FulcrumParams):
     steady: bool = parameter(
         True, "whether it is kept from drifting along the shaft, over minutes"
     )
+    period: float = parameter(PERIOD, "of the estimate", "s", above=0.0, most=0.1)
 
 
 @dataclass
@@ -161,6 +172,11 @@ class Entry:
     )
 
 
+def clocked(kind: Any, **more: Any) -> Any:
+    """A field that holds the parameters of a block on the common clock."""
+    return part(lambda: kind(period=PERIOD, **more))
+
+
 @dataclass
 class KeyholeScenario(Scenario, WristSettings):
     """One patient, one plant: tube and snake through the trocar of who breathes."""
@@ -175,13 +191,17 @@ class KeyholeScenario(Scenario, WristSettings):
     fulcrum_estimator: SteadyFulcrum = part(SteadyFulcrum)
     organ_motion: OrganMotionParams = part(OrganMotionParams)
     organ_tracker: OrganTracker = part(OrganTracker)
-    organ_estimator: OrganEstimatorParams = part(OrganEstimatorParams)
-    phases: PhasesParams = part(PhasesParams)
-    tube_task: TubeTaskParams = part(TubeTaskParams)
-    snake_task: SnakeTaskParams = part(SnakeTaskParams)
+    organ_estimator: OrganEstimatorParams = clocked(OrganEstimatorParams)
+    phases: PhasesParams = clocked(PhasesParams)
+    tube_task: TubeTaskParams = clocked(TubeTaskParams)
+    snake_task: SnakeTaskParams = clocked(SnakeTaskParams)
+    tool_wrench: ToolWrenchParams = clocked(ToolWrenchParams)
+    wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
+    # Half of an instrument's: the snake's couplers feel what the tube's end does.
+    passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
     circle: CircleParams = part(CircleParams)
     operation: OrganOperation = part(OrganOperation)
-    joints: JointCommandsParams = part(JointCommandsParams)
+    joints: JointCommandsParams = clocked(JointCommandsParams)
     arm: ArmParams = part(ArmParams)
     instrument: TubeParams = part(TubeParams)
     abdomen: AbdomenParams = part(AbdomenParams)
@@ -266,13 +286,15 @@ def circle_postures(scenario: KeyholeScenario) -> tuple[np.ndarray, np.ndarray]:
 
 def check(scenario: KeyholeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    check_wrist(scenario)
     check_resection(scenario.operation)
-    if abs(scenario.operation.period - scenario.joints.period) > 1e-9:
-        raise ScenarioError(
-            f"operation.period={scenario.operation.period} s: expected joints.period="
-            f"{scenario.joints.period} s; arm and snake share their instants"
-        )
+    period = scenario.joints.period
+    for name in CLOCKED:
+        own = getattr(scenario, name).period
+        if abs(own - period) > 1e-9:
+            raise ScenarioError(
+                f"{name}.period={own} s: expected joints.period={period} s; arm, wrist "
+                "and snake share their instants"
+            )
     _check_reach(scenario)
     if scenario.task == "circle":
         circle_postures(scenario)

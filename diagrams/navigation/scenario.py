@@ -3,12 +3,20 @@
 from dataclasses import dataclass, replace
 from math import atan2, dist, hypot
 
+import numpy as np
+
 from diagrams.common.scenario import Scenario, ScenarioError
 from plants.crowd.crowd_motion import CrowdParams, starts
 from plants.crowd.obstacle_motion import FAR, ObstacleParams, obstacle_at
 from plants.crowd.signals import Obstacle
+from plants.crowd.walls import WallParams, segments, wall_distance
+from plants.turtlebot.lidar import LidarParams
+from plants.turtlebot.odometry import OdometryParams
 from plants.turtlebot.turtlebot import TurtlebotParams
 from systems.common.parameter import parameter, part
+from systems.perception.grid_mapping import GridMappingParams
+from systems.perception.signals import CELLS
+from systems.perception.tracking import TrackingParams
 from systems.switching.classical_planner import ClassicalParams
 from systems.switching.perception import PerceptionParams
 from systems.switching.statechart_planner import StatechartParams
@@ -16,6 +24,7 @@ from systems.switching.switching_state import SwitchingParams
 from systems.switching.unicycle_control import UnicycleControlParams
 
 PLANNERS = ("switching", "statechart", "classical")
+SENSES = ("given", "lidar")
 
 
 @dataclass
@@ -45,7 +54,18 @@ class NavigationScenario(Scenario):
     obstacles: list[ObstacleParams] = parameter(
         [], "discs and how they move", shape=(-1,)
     )
+    walls: list[WallParams] = parameter([], "what stands, seen by lidar", shape=(-1,))
     crowd: CrowdParams = part(CrowdParams)
+    senses: str = parameter(
+        "given",
+        "what the robot knows: what is true within its vision, with the noise of "
+        "perception, or what lidar and odometry tell",
+        choices=SENSES,
+    )
+    lidar: LidarParams = part(LidarParams)
+    odometry: OdometryParams = part(OdometryParams)
+    mapping: GridMappingParams = part(GridMappingParams)
+    tracking: TrackingParams = part(TrackingParams)
     thesis_figures: bool = parameter(False, "whether a run draws the thesis's figures")
     robot: TurtlebotParams = part(TurtlebotParams)
     perception: PerceptionParams = part(PerceptionParams)
@@ -68,6 +88,15 @@ def discs(scenario: NavigationScenario) -> list[Obstacle]:
     return [obstacle_at(params, 0.0) for params in scenario.obstacles]
 
 
+def mapping_params(scenario: NavigationScenario) -> GridMappingParams:
+    """The grid: its middle is that of start and goal where the scenario has none."""
+    given = scenario.mapping
+    if given.x or given.y:
+        return given
+    (x, y), (gx, gy) = scenario.start, scenario.goal
+    return replace(given, x=0.5 * (x + gx), y=0.5 * (y + gy))
+
+
 def companions(scenario: NavigationScenario) -> dict[str, NavigationScenario]:
     """The same world with each of the planners to compare with, by planner."""
     return {
@@ -87,7 +116,34 @@ def check(scenario: NavigationScenario) -> None:
             f"goal={scenario.goal}: {way:.3g} m from start={scenario.start}, expected "
             f"more than reach={scenario.reach} m"
         )
+    _check_walls(scenario)
     _check_room(scenario)
+
+
+def _check_walls(scenario: NavigationScenario) -> None:
+    """Walls are seen by lidar, start and goal are clear of them, and on the grid."""
+    if scenario.senses == "given":
+        if scenario.walls:
+            raise ScenarioError("walls: expected senses=lidar, which alone sees them")
+        return
+    segments(scenario.walls)
+    grid, body = mapping_params(scenario), scenario.robot.radius
+    half = 0.5 * CELLS * grid.cell
+    ends = {"start": scenario.start, "goal": scenario.goal}
+    for name, place in ends.items():
+        if max(abs(place[0] - grid.x), abs(place[1] - grid.y)) > half:
+            raise ScenarioError(
+                f"{name}={place}: beyond the grid, {2.0 * half:.3g} m wide about "
+                f"[{grid.x:.3g}, {grid.y:.3g}]; expected within it, or a larger "
+                "mapping.cell"
+            )
+    gaps = wall_distance(scenario.walls, np.array(list(ends.values())))
+    for (name, place), gap in zip(ends.items(), gaps, strict=True):
+        if gap < body:
+            raise ScenarioError(
+                f"{name}={place} lies in a wall as the robot sees it: {gap:.3g} m from "
+                f"it, expected at least {body:.3g}"
+            )
 
 
 def _check_room(scenario: NavigationScenario) -> None:

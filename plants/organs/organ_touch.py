@@ -82,14 +82,14 @@ def true_gaps(
     values: np.ndarray,
     table: np.ndarray,
     moved: np.ndarray,
-    robot: np.ndarray,
+    rod: np.ndarray,
     R: np.ndarray,
     p: np.ndarray,
 ) -> np.ndarray:
     """`OrganGap` of each organ; for the arguments see `touch`."""
     organs = Organs(values, table, moved.reshape(-1, 6))
-    a, b = placed(R, p, robot[0]), placed(R, p, robot[1])
-    found = gaps(organs, a, b, robot[2])
+    a, b = placed(R, p, rod[0]), placed(R, p, rod[1])
+    found = gaps(organs, a, b, rod[2])
     least = np.empty(len(found))
     for k in range(len(found)):
         least[k] = min(found[k, 0], found[k, 2])
@@ -101,7 +101,7 @@ def touch(
     values: np.ndarray,
     table: np.ndarray,
     moved: np.ndarray,
-    robot: np.ndarray,
+    rod: np.ndarray,
     R: np.ndarray,
     p: np.ndarray,
     tissue: np.ndarray,
@@ -114,7 +114,7 @@ def touch(
         values: See `Organs`.
         table: See there.
         moved: See there, flat.
-        robot: Where the shaft begins and ends along z of its body B, its radius, m (3).
+        rod: Where the shaft begins and ends along z of its body B, its radius, m (3).
         R: Orientation of B in W.
         p: Position of B in W, m.
         tissue: Stiffness in N/m and damping in N s/m of each organ (n, 2).
@@ -125,8 +125,8 @@ def touch(
         `Touch`, the depths, where along z of B it is, m, and the least gap: (n + 9).
     """
     organs = Organs(values, table, moved.reshape(-1, 6))
-    a, b = placed(R, p, robot[0]), placed(R, p, robot[1])
-    found, out, most = gaps(organs, a, b, robot[2]), np.zeros(9 + len(depths)), 0.0
+    a, b = placed(R, p, rod[0]), placed(R, p, rod[1])
+    found, out, most = gaps(organs, a, b, rod[2]), np.zeros(9 + len(depths)), 0.0
     last, near = 7 + len(depths), 1e9
     out[3], out[4], out[5] = b
     for k in range(len(found)):
@@ -144,7 +144,7 @@ def touch(
             push = scaled(f, normal(organs, k, at))
             for i in range(3):
                 out[i], out[3 + i] = push[i], at[i]
-            out[6], out[last] = depth, robot[0] + s * (robot[1] - robot[0])
+            out[6], out[last] = depth, rod[0] + s * (rod[1] - rod[0])
     out[last + 1] = near
     return out
 

@@ -12,11 +12,15 @@ from diagrams.navigation.figures import thesis_figures
 from diagrams.navigation.plots import plots
 from diagrams.navigation.scenario import outruns
 from diagrams.studies import load_scenario
+from plants.crowd.signals import CAPACITY
 from plants.turtlebot.turtlebot import RobotState
 from systems.switching.switching_state import MODES
 from tests.runs import run
 
-NAMES = ("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd")
+NAMES = (
+    *("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd"),
+    "lidar_crowd",
+)
 KEYS = {
     *("reached", "collided", "time_to_target", "min_clearance", "path_ratio"),
     *("planner_step_median", "mode_switches", "real_time_factor"),
@@ -145,7 +149,7 @@ def test_signals_have_the_names_of_their_declarations():
     assert list(r.signals)[1:6] == [f"robot.state.{n}" for n in RobotState._fields]
     assert list(r.signals)[6] == "obstacles.rows.x_0"
     obstacles, robot = r.obstacles.rows, r.robot.state
-    assert obstacles.x.shape == (*robot.x.shape, 24)
+    assert obstacles.x.shape == (*robot.x.shape, CAPACITY)
     np.testing.assert_array_equal(obstacles.radius[:, 0], 0.5)
     np.testing.assert_array_equal(robot.theta, r.signals["robot.state.theta"])
 

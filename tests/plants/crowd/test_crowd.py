@@ -68,10 +68,10 @@ def test_bad_obstacles_are_refused(change, message):
 def test_a_world_may_be_empty_or_full_but_no_more():
     dut = ObstacleMotion([])
     rows = view(OBSTACLES, dut.GetOutputPort("obstacles").Eval(dut.AllocateContext()))
-    assert len(rows.radius) == 24 and not rows.radius.any()
+    assert len(rows.radius) == 40 and not rows.radius.any()
     assert len(ObstacleMotion().obstacles) == 1
-    with pytest.raises(ValueError, match="obstacles: 25 of them: expected <= 24"):
-        ObstacleMotion([ObstacleParams()] * 25)
+    with pytest.raises(ValueError, match="obstacles: 41 of them: expected <= 40"):
+        ObstacleMotion([ObstacleParams()] * 41)
 
 
 def test_two_who_meet_give_way_to_each_other():
@@ -124,7 +124,7 @@ def test_the_block_walks_as_the_crowd_does():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"people": 100}, r"crowd.people=100: expected >= 0 and <= 24"),
+        ({"people": 100}, r"crowd.people=100: expected >= 0 and <= 40"),
         ({"people": 24, "radius": 0.6}, "crowd.people=24: expected <= 14: no more fit"),
         ({"people": -1}, r"crowd.people=-1: expected >= 0"),
         ({"speed": 0.0}, r"crowd.speed=0.0 m/s: expected > 0"),

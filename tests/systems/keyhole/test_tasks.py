@@ -5,6 +5,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 import pytest
 
+from plants.arm.arm import servo_step
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
 from plants.instruments.tube import TubeParams
@@ -12,7 +13,8 @@ from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolTarget
 from plants.snake.snake import add_snake
-from systems.common.signal import example, flat, view
+from systems.common.geometry import Pose
+from systems.common.signal import example, flat, vector, view
 from systems.common.signals import ToolMotion
 from systems.keyhole.phases import Phases
 from systems.keyhole.signals import Phase, SnakeStatus, TubePose, TubeStatus
@@ -30,14 +32,15 @@ def test_tube_pose_is_the_plants():
     context = plant.CreateDefaultContext()
     dut = TubeLocation(tube)
     own = dut.CreateDefaultContext()
+    A, C = servo_step(plant, READY_POSTURE, None, 1 / 120)
     for _ in range(5):
-        q = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
-        lag, step = rng.uniform(-0.01, 0.01, (2, 7))
-        dut.GetInputPort("arm_state").FixValue(own, np.append(q, np.zeros(7)))
-        dut.GetInputPort("posture").FixValue(own, q + lag)
-        dut.GetInputPort("next").FixValue(own, q + lag + step)
+        q_d = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
+        lag, step, v = rng.uniform(-0.01, 0.01, (3, 7))
+        dut.GetInputPort("arm_state").FixValue(own, [*(q_d + lag), *v])
+        dut.GetInputPort("posture").FixValue(own, q_d)
+        dut.GetInputPort("next").FixValue(own, q_d + step)
         seen = view(TubePose, np.array(dut.GetOutputPort("tube").Eval(own)))
-        plant.SetPositions(context, q + step)
+        plant.SetPositions(context, q_d + step + A @ lag + C @ (v / 120 - step))
         X = plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(context)
         np.testing.assert_allclose(seen.p, X.translation(), atol=1e-12)
         np.testing.assert_allclose(seen.x, X.rotation().col(0), atol=1e-12)
@@ -62,12 +65,13 @@ def test_a_target_in_the_organ_is_one_in_the_channel():
         A, B = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
         R_WE, R_WC = (R * np.sign(np.linalg.det(R)) for R in (A, B))
         p_WE, p_WP, p_E = rng.normal(size=(3, 3))
-        tube = flat(TubePose(p_WP, R_WC[:, 0], R_WC[:, 2]))
-        target = flat(ToolTarget(p_E, *np.eye(3)[:2]))
-        out = in_channel(target, R_WE.T[::2].copy(), p_WE, tube, 0.04)
+        tube = TubePose(*map(vector, (p_WP, R_WC[:, 0], R_WC[:, 2])))
+        target = ToolTarget(vector(p_E), *map(vector, np.eye(3)[:2]))
+        E = Pose(*map(vector, (p_WE, *R_WE.T)))
+        out = in_channel(target, E, tube, 0.04)
         p_WC = p_WP + 0.04 * R_WC[:, 2]
-        np.testing.assert_allclose(p_WC + R_WC @ out[:3], p_WE + R_WE @ p_E, atol=1e-12)
-        np.testing.assert_allclose(R_WC @ out[3:6], R_WE[:, 0], atol=1e-12)
+        np.testing.assert_allclose(p_WC + R_WC @ out.p, p_WE + R_WE @ p_E, atol=1e-12)
+        np.testing.assert_allclose(R_WC @ out.n, R_WE[:, 0], atol=1e-12)
 
 
 class Played:
