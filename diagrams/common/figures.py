@@ -51,6 +51,8 @@ FIGURES = {
     "max_tissue_force": Figure("N", "greatest true force of an organ on the tool"),
     "press_force_mean": Figure("N", "true force on the organ while it is held, mean"),
     "press_force_worst": Figure("N", "the same, farthest from what is wanted"),
+    "tips_in_view": Figure("%", "share of the time that both tips are seen, unblocked"),
+    "camera_path": Figure("m", "of the endoscope's tip"),
     # passive wrist
     "wrist": Figure("", "how the wrist is led"),
     "time_over_warning": Figure("s", "with the force over the warning"),

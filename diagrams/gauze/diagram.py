@@ -29,6 +29,7 @@ from systems.bypass.clearance_constraint import ClearanceConstraint
 from systems.bypass.tool_bypass import ToolBypass
 from systems.common.signal import size
 from systems.common.signals import Estimate
+from systems.motion.camera_planner import CameraPlanner
 from systems.motion.endoscope import Endoscope
 from systems.motion.joint_commands import JointCommands
 from systems.motion.tool_navigation import ToolNavigation
@@ -131,6 +132,12 @@ EXTRA_WIRES = (
 )
 """Wires to inputs that only the bypass has."""
 
+SEEING = (
+    ("robot_location.robot_tool", "endoscope.robot_tool"),
+    ("obstacles.estimates", "endoscope.obstacles"),
+)
+"""Wires to a camera that plans."""
+
 EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
     "planner.guide": "go_to_target.guide",
@@ -208,7 +215,9 @@ def make_blocks(
         "tracker_noise": RandomSource(
             RandomDistribution.kGaussian, 6 * len(tools), s.tracker.period
         ),
-        "endoscope": Endoscope(s.camera),
+        "endoscope": CameraPlanner(s.camera_planner, s.camera, obstacles, organs)
+        if s.camera_planner.active
+        else Endoscope(s.camera),
         "robot_location": RobotLocation(s.instrument),
         "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles, organs)
         if s.behaviour == "bypass"
@@ -261,6 +270,9 @@ def wiring(
         exports |= inside.EXPORTS | (
             inside.PRESS_EXPORTS if scenario.press.active else {}
         )
+    if scenario.camera_planner.active:
+        wires += SEEING
+        exports["camera.sight"] = "endoscope.sight"
     wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)

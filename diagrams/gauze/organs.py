@@ -9,15 +9,20 @@ from plants.organs.organ_touch import OrganGap, OrganTouch, Touch
 from plants.organs.organs import OrganSet, add_organ_motions, organ_set
 from plants.organs.posed_organs import PosedOrgans
 from systems.common.signal import Many
+from systems.common.signals import MovingPoint
 from systems.motion.tissue_press import Phase, Press, TissuePress
 from systems.sensing.tissue_force import TissueForce, TissueTouch, WallWrench
 
 AMONG = (
     *("organ_touch", "posed_organs", "go_to_target", "clearance_constraint"),
-    *("tissue_force", "tissue_press"),
+    *("tissue_force", "tissue_press", "endoscope"),
 )
 """Blocks that take how organs move, where they have a port for it."""
-EXPORTS = {"organs.touch": "organ_touch.touch", "organs.gaps": "organ_touch.gaps"}
+EXPORTS = {
+    "organs.touch": "organ_touch.touch",
+    "organs.gaps": "organ_touch.gaps",
+    "organs.moved": "organs.y0",
+}
 
 
 def known_organs(scenario: Any) -> OrganSet | None:
@@ -108,7 +113,9 @@ def organ_signals(scenario: Any) -> dict[str, Any]:
     if not scenario.organs:
         return {}
     names = tuple(organ.name for organ in scenario.organs)
-    found = {"organs.touch": Touch, "organs.gaps": Many(OrganGap, names)}
+    found: dict[str, Any] = {"organs.touch": Touch}
+    found["organs.gaps"] = Many(OrganGap, names)
+    found["organs.moved"] = Many(MovingPoint, names)
     if scenario.press.active:
         found |= {"press.status": Press, "press.touch": TissueTouch}
     return found

@@ -35,6 +35,7 @@ from systems.common.geometry import sub, unit
 from systems.common.parameter import parameter, part
 from systems.common.signal import vector
 from systems.common.signals import ViewCone
+from systems.motion.camera_planner import CameraPlannerParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.motion.tissue_press import TissuePressParams
 from systems.motion.tool_navigation import (
@@ -65,6 +66,10 @@ class GauzeScenario(Scenario, WristSettings):
     robot: ToolAtStart = part(ToolAtStart)
     tools: list[Tool] = field(default_factory=usual_tools)
     organs: list[Organ] = parameter([], "of the patient", shape=(-1,))
+    camera_planner: CameraPlannerParams = part(CameraPlannerParams)
+    judge_sight: bool = parameter(
+        False, "whether `tips_in_view` and `camera_path` are measured"
+    )
     organ_touch: OrganTouchParams = part(OrganTouchParams)
     tissue_force: TissueForceParams = part(TissueForceParams)
     press: TissuePressParams = part(TissuePressParams)

@@ -9,6 +9,7 @@ from diagrams.bedside.wrist import WRIST_SIGNALS
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
+from diagrams.gauze import film
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.organs import organ_signals
@@ -33,6 +34,7 @@ from systems.common.signals import (
     ViewCone,
 )
 from systems.motion.joint_commands import Status
+from systems.motion.sight import Sight
 from systems.motion.tool_navigation import StopCode
 
 SIGNALS = {
@@ -72,6 +74,8 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
     }
     ports |= WRIST_SIGNALS if scenario.emulated else {}
     ports |= organ_signals(scenario)
+    if scenario.camera_planner.active:
+        ports["camera.sight"] = Sight
     if scenario.behaviour != "bypass":
         del ports["planner.way"]
     return ports
@@ -113,6 +117,8 @@ STUDY = Study(
     controller="tool_navigation",
     adjust=stiffen,
     companions=companions,
+    can_film=film.refuse_without_egl,
+    film=film.save_film,
     required=(
         "system",
         "duration",

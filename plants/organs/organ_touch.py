@@ -28,7 +28,7 @@ from systems.common.signal import Field, Many, Vector
 
 _NEAR = 0.02
 """Farther from an organ it is not looked closely, m."""
-_FASTEST = 0.3
+_FASTEST = 0.2
 """Tool and organ never approach each other faster, m/s."""
 
 
