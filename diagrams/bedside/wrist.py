@@ -134,6 +134,7 @@ def add_wrist(
         "fulcrum_estimator": FulcrumEstimator(estimator),
         "passive_wrist": PassiveWristEmulation(wrist),
     }
+    systems["wrist_sensor"] = builder.GetSubsystemByName("wrist_sensor")
     for name in ("wrench_watch", "fulcrum_estimator", "passive_wrist"):
         builder.AddNamedSystem(name, systems[name])
     return systems

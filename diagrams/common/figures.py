@@ -47,6 +47,12 @@ FIGURES = {
     "edge_switches": Figure("", "changes of the side that is passed"),
     "waiting_time": Figure("s", "spent waiting for a way"),
     "time_ratio": Figure("x", "time to target against that without the obstacle"),
+    "min_organ_clearance": Figure("m", "least true gap of shaft and gauze to an organ"),
+    "max_tissue_force": Figure("N", "greatest true force of an organ on the tool"),
+    "press_force_mean": Figure("N", "true force on the organ while it is held, mean"),
+    "press_force_worst": Figure("N", "the same, farthest from what is wanted"),
+    "tips_in_view": Figure("%", "share of the time that both tips are seen, unblocked"),
+    "camera_path": Figure("m", "of the endoscope's tip"),
     # passive wrist
     "wrist": Figure("", "how the wrist is led"),
     "time_over_warning": Figure("s", "with the force over the warning"),

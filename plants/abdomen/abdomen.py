@@ -29,6 +29,8 @@ from pydrake.multibody.tree import (
 
 from plants.abdomen.skin import draw_skin
 from plants.common.looks import TROCAR, draw
+from systems.common.compiled import compiled
+from systems.common.geometry import Vector, along, cross, scaled
 from systems.common.parameter import check, parameter
 
 _SEAL_VISCOSITY = 1e4
@@ -163,6 +165,27 @@ def add_abdomen(
     for instance in (wall_instance, sleeve_instance):
         plant.set_gravity_enabled(instance, False)
     return Abdomen(wall_instance, sleeve_instance, wall, sleeve, joint, bushing, params)
+
+
+@compiled
+def spring_on_sleeve(
+    p: Vector, v: Vector, w: Vector, stiffness: float, damping: float
+) -> tuple[Vector, Vector]:
+    """What the bushing does to the sleeve, in W: torque about its origin, and force.
+
+    Drake's bushing acts half-way between its two frames, and its damper does not count
+    half of the frames' turning against each other.
+
+    Args:
+        p: From the fulcrum to the sleeve, in m.
+        v: Velocity of the sleeve relative to the fulcrum, in m/s.
+        w: Angular velocity of the sleeve; the wall does not turn.
+        stiffness: K in N/m.
+        damping: D in N s/m.
+    """
+    seen = along(v, -0.5, cross(w, p))
+    force = along(scaled(-stiffness, p), -damping, seen)
+    return scaled(-0.5, cross(p, force)), force
 
 
 def seat_sleeve(plant: Any, context: Any, abdomen: Abdomen) -> None:

@@ -41,6 +41,7 @@ BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
+    "gauze_press": [],
     "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
