@@ -315,6 +315,7 @@ def run_scenario(
     out: Path,
     with_replay: bool = True,
     progress: Progress = silent,
+    with_film: bool = False,
 ) -> Run:
     """Runs a scenario and writes all its results into a folder.
 
@@ -328,6 +329,11 @@ def run_scenario(
             another run writes to it.
     """
     check_scenario(scenario)
+    if with_film:
+        can_film = get_study(scenario.system).can_film
+        if can_film is None:
+            raise ScenarioError(f"--endoscope: {scenario.system} has no endoscope")
+        can_film()
     with results(out) as into:
         case = prepare(scenario, progress)
         diagram = build(case)
@@ -353,6 +359,9 @@ def run_scenario(
                     meshcat.SetProperty(f"/{replay.FAR}", "visible", False)
                     with into.file("close_up.html") as draft:
                         draft.write_text(meshcat.StaticHtml())
+            if with_film and run.metrics:
+                with survived(run, "film could not be rendered: "):
+                    run.study.film(run, into)
             write_page(run, into)
     return run
 

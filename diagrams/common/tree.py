@@ -223,7 +223,7 @@ def member(schema: Any, value: Any) -> Any:
         return members[0]
     roles = {role: m for m in members for role in _roles(m)}
     role = value.get("role", next(iter(_roles(members[0])), ""))
-    if role not in roles:
+    if role not in [*roles]:  # a list is no key
         raise ScenarioError(f"role={role!r}: {nearest(str(role), roles)}")
     return roles[role]
 

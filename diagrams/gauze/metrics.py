@@ -6,6 +6,8 @@ import numpy as np
 
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
+from diagrams.gauze.organs import organ_figures
+from diagrams.gauze.sight import sight_figures
 from diagrams.gauze.tools import TARGET, gap, logged
 from plants.surgeon.recording import load_recording
 from systems.common.stops import Stop
@@ -91,7 +93,8 @@ def measure(run: Any) -> dict[str, Any]:
     played = recordings_played(run)
     if played is not None:
         figures["recording_played"] = played
-    figures |= bypass_figures(run, arrival, tip_error)
+    figures |= bypass_figures(run, arrival, tip_error) | organ_figures(run)
+    figures |= sight_figures(run)
     if run.scenario.emulated:
         figures |= wrist_figures(run, run.scenario.measure_from)
     return figures

@@ -31,9 +31,12 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
+from plants.organs.distance import Organs
+from plants.organs.organs import OrganSet, arrays, port
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
+from systems.bypass.organ_rows import organ_rows
 from systems.bypass.shadow_body import ObstacleTool, read_tool
 from systems.bypass.workspace import WorkspaceParams, borders
 from systems.common.compiled import compiled, packed
@@ -228,6 +231,7 @@ def constrain(
     wanted: Vector,
     tools: np.ndarray,
     dodging: np.ndarray,
+    organs: Organs | None = None,
 ) -> tuple[Vector, np.ndarray, ClearanceStatus]:
     """One step: the tip's velocity nearest to the wanted one that is safe.
 
@@ -240,6 +244,7 @@ def constrain(
         wanted: The tip's wanted velocity, m/s.
         tools: Rows of `ObstacleTool`.
         dodging: Whether R dodges each of them, 1 or 0; as many or more.
+        organs: What else to keep clear of; None is compiled away.
 
     Returns:
         The tip's velocity in m/s, whether R dodges each tool, and the status.
@@ -247,14 +252,19 @@ def constrain(
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft)
     turning = q * params.turning_speed
-    most = 3 * len(tools) + 5
-    rows, bounds = np.empty((most, 3)), np.empty(most)
     dodges = np.zeros(len(dodging))
     least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
     near = params.obstacle_speed / params.rate
     inwards, room = borders(workspace, view_cone, g, p)
     # A tip that is outside comes back no faster than it may go at all.
     returning = np.minimum(-params.rate * room, 0.25 * params.max_speed)
+    further, least_rates = inwards, returning
+    if organs is not None:
+        organs_inwards, organs_returning = organ_rows(params, organs, g, p)
+        further = np.concatenate((inwards, organs_inwards))
+        least_rates = np.concatenate((returning, organs_returning))
+    most = 3 * len(tools) + len(least_rates)
+    rows, bounds = np.empty((most, 3)), np.empty(most)
     last = 0
     for i in range(len(tools)):
         tool = read_tool(tools[i])
@@ -287,13 +297,13 @@ def constrain(
     if dodge > 0.5:
         wanted = scaled(-params.max_speed, u)
     if params.active:
-        rows[last : last + 5], bounds[last : last + 5] = inwards, returning
-        last += 5
+        count = last + len(least_rates)
+        rows[last:count], bounds[last:count] = further, least_rates
         v, missed = nearest_velocity(
-            wanted, rows[:last], bounds[:last], u, params.max_speed, turning
+            wanted, rows[:count], bounds[:count], u, params.max_speed, turning
         )
         change = norm(sub(v, wanted))
-        # Several tools may ask for what cannot be had together.
+        # Several tools and organs may ask for what cannot be had together.
         if missed > _MISSED:
             holds = 0.0
         wanted = v
@@ -302,10 +312,11 @@ def constrain(
 
 
 @compiled
-def _step(
+def hold(
     params: Any,
     margins: Any,
     workspace: Any,
+    organs: Organs | None,
     dodging: np.ndarray,
     v_R: Velocity,
     guide: Guide,
@@ -316,6 +327,7 @@ def _step(
     view_cone: ViewCone,
     permission: Permission,
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    """One step of the block, among organs or, None, without."""
     v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
     known = all_usable(obstacles) and usable(target)
     numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
@@ -334,8 +346,51 @@ def _step(
         scaled(share, v),
         tools,
         dodging,
+        organs,
     )
     return dodges, Velocity(scaled(s, v)), status
+
+
+@compiled
+def _step(
+    params: Any,
+    margins: Any,
+    workspace: Any,
+    dodging: np.ndarray,
+    v_R: Velocity,
+    guide: Guide,
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+    camera: Estimate,
+    view_cone: ViewCone,
+    permission: Permission,
+) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    known = (robot, obstacles, target, camera, view_cone, permission)
+    return hold(params, margins, workspace, None, dodging, v_R, guide, *known)
+
+
+@compiled
+def _step_among(
+    params: Any,
+    margins: Any,
+    workspace: Any,
+    values: np.ndarray,
+    table: np.ndarray,
+    dodging: np.ndarray,
+    v_R: Velocity,
+    guide: Guide,
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+    camera: Estimate,
+    view_cone: ViewCone,
+    permission: Permission,
+    moved: np.ndarray,
+) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    organs = Organs(values, table, moved)
+    known = (robot, obstacles, target, camera, view_cone, permission)
+    return hold(params, margins, workspace, organs, dodging, v_R, guide, *known)
 
 
 class ClearanceConstraint(StepBlock):
@@ -355,6 +410,7 @@ class ClearanceConstraint(StepBlock):
     Port ``view_cone`` accepts the `ViewCone`.
     Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
     Evasion is not slowed.
+    Port ``organs``, if there are any, accepts the `MovingPoint` of each.
     Port ``v_safe`` emits the `Velocity` of the guide point.
     Port ``status`` emits the `ClearanceStatus`.
 
@@ -368,6 +424,7 @@ class ClearanceConstraint(StepBlock):
         reach: ReachLimits | None = None,
         workspace: WorkspaceParams | None = None,
         obstacles: Sequence[str] = ("obstacle",),
+        organs: OrganSet | None = None,
     ) -> None:
         """Builds the block.
 
@@ -377,6 +434,7 @@ class ClearanceConstraint(StepBlock):
             reach: What the navigation behind it keeps to; the defaults if None.
             workspace: Further limits of R's tip; the defaults if None.
             obstacles: Names of the obstacle tools.
+            organs: What else to keep clear of; nothing if None.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -384,11 +442,12 @@ class ClearanceConstraint(StepBlock):
         super().__init__()
         params = params or ClearanceConstraintParams()
         self.declare_step(
-            _step,
+            _step if organs is None else _step_among,
             [
                 constants(params),
                 tools_around.constants(margins or Margins()),
                 limits.constants(reach, workspace),
+                *arrays(organs),
             ],
             {
                 "v_R": Velocity,
@@ -399,6 +458,7 @@ class ClearanceConstraint(StepBlock):
                 "camera": Estimate,
                 "view_cone": ViewCone,
                 "permission": Permission,
+                **port(organs),
             },
             np.zeros(len(obstacles) + 2),
             {"v_safe": Velocity, "status": ClearanceStatus},

@@ -41,9 +41,11 @@ BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
+    "gauze_press": [],
     "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
+    "nav_lidar_crowd": [],
     "snake_wire_break": [],
     "snake_unstable": [],
     "resect_paper": ["spacing=0.001", "reach_effort=0.05"],
@@ -205,7 +207,8 @@ COMMANDS = {
 come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
-    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
+    *("GridMapping", "Perception", "RobotLocation", "SnakeLoad", "SnakeLocation"),
+    *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "ToolLoad", "WrenchWatch"),
 }
