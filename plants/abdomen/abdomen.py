@@ -30,7 +30,7 @@ from pydrake.multibody.tree import (
 from plants.abdomen.skin import draw_skin
 from plants.common.looks import TROCAR, draw
 from systems.common.compiled import compiled
-from systems.common.geometry import Vector, along, cross, scaled
+from systems.common.geometry import Pose, Vector, along, cross, scaled
 from systems.common.parameter import check, parameter
 
 _SEAL_VISCOSITY = 1e4
@@ -186,6 +186,32 @@ def spring_on_sleeve(
     seen = along(v, -0.5, cross(w, p))
     force = along(scaled(-stiffness, p), -damping, seen)
     return scaled(-0.5, cross(p, force)), force
+
+
+@compiled
+def turning_on_sleeve(sleeve: Pose, w: Vector, k: Any, d: Any) -> Vector:
+    """The torque in W of a bushing that resists turning, as Drake has it.
+
+    It goes with roll, pitch and yaw of the sleeve in the fulcrum's frame, which is W's
+    turned about x by half a turn.
+
+    Args:
+        sleeve: Its frame.
+        w: Its angular velocity.
+        k: The bushing's torque stiffness (3).
+        d: Its torque damping (3).
+    """
+    x, y, z = sleeve.x, sleeve.y, sleeve.z
+    roll, yaw = math.atan2(-y[2], -z[2]), math.atan2(-x[1], x[0])
+    pitch = math.asin(min(max(x[2], -1.0), 1.0))
+    c, s, cp, tp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.tan(pitch)
+    # Their rates are N times the angular velocity, the torque N^T times theirs.
+    across, along_ = c * w[0] - s * w[1], -s * w[0] - c * w[1]
+    t0 = -k[0] * roll - d[0] * across / cp
+    t1 = -k[1] * pitch - d[1] * along_
+    t2 = -k[2] * yaw - d[2] * (tp * across - w[2])
+    out = t0 / cp + tp * t2
+    return c * out - s * t1, -(s * out + c * t1), -t2
 
 
 def seat_sleeve(plant: Any, context: Any, abdomen: Abdomen) -> None:
