@@ -24,10 +24,11 @@ from plants.snake.reachability import why_not
 from plants.surgeon.recording import load_recording
 from plants.tissue.volume import Access
 from systems.bypass.obstacle_tools import Margins
+from systems.common.geometry import pose_of
 from systems.common.parameter import Rules, parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
-from systems.keyhole.snake_task import SnakeTaskParams
+from systems.keyhole.snake_task import SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
@@ -50,6 +51,8 @@ CLOCKED = (
 """Blocks that share their instants."""
 BASE = 2e-3
 """How far the snake's base may stand within the tube at work, in m."""
+BENT = (-0.015, 0.2, -0.3, 0.3, 0.2, 0.4, -0.1)
+"""A posture as plans have them, as far in as they go."""
 TURN = 120
 """Postures of a turn of the circle."""
 
@@ -296,6 +299,8 @@ def check(scenario: KeyholeScenario) -> None:
                 "and snake share their instants"
             )
     _check_reach(scenario)
+    if scenario.task == "resect":
+        _check_clearance(scenario)
     if scenario.task == "circle":
         circle_postures(scenario)
     if scenario.others:
@@ -331,6 +336,41 @@ def _check_reach(scenario: KeyholeScenario) -> None:
             f"instrument.length={length} m: the tube is too short, the mount would "
             f"meet the trocar; expected >= "
             f"{most + 0.02 + scenario.instrument.mount_length:.3f}"
+        )
+
+
+def tube_tilt(scenario: KeyholeScenario) -> float:
+    """Greatest angle of the tube at its station against z_E over a breath, in rad."""
+    wall, organ, z = scenario.wall_motion, scenario.organ_motion, scenario.axis
+    station = np.array(scenario.entry.p_WE) - scenario.tube_task.standoff * z
+    most = 0.0
+    for t in np.linspace(0.0, 1.0 / wall.rate, 49).tolist():
+        p_WG = np.add(scenario.robot.p_WG, wall.displacement(t))
+        u = station + organ.displacement(t, wall) - p_WG
+        most = max(most, math.acos(min(1.0, float(z @ u / np.linalg.norm(u)))))
+    return most
+
+
+def _check_clearance(scenario: KeyholeScenario) -> None:
+    """The plan must have room for what the tube's tilt does to the snake's body."""
+    o, angle, gap = scenario.operation, tube_tilt(scenario), scenario.instrument.gap
+    if scenario.phases.deviation > o.clearance:
+        raise ScenarioError(
+            f"phases.deviation={scenario.phases.deviation} m: expected <= "
+            f"operation.clearance={o.clearance} m, the room that the plan has"
+        )
+    c, s = math.cos(angle), math.sin(angle)
+    E = pose_of((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    C = pose_of((gap * s, 0.0, gap * (c - 1.0)), (c, 0.0, -s), (s, 0.0, c))
+    snake = o.snake
+    geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
+    away = body_deviation(np.array(BENT), C, E, *geometry)
+    if away > o.clearance:
+        raise ScenarioError(
+            f"operation.clearance={o.clearance} m: wall and organ tilt the tube by "
+            f"{math.degrees(angle):.1f} deg over a breath, which bends the snake's "
+            f"body off its plan by {away:.2g} m; expected at least that, or motions "
+            "more in phase"
         )
 
 

@@ -14,6 +14,7 @@ from diagrams.navigation.scenario import (
     discs,
     heading,
     mapping_params,
+    walking,
 )
 from plants.crowd.crowd_motion import CrowdMotion
 from plants.crowd.obstacle_motion import ObstacleMotion
@@ -151,9 +152,9 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that `WIRES` uses."""
     s = scenario
     if s.crowd.people:
-        obstacles: Any = CrowdMotion(s.crowd)
+        obstacles: Any = CrowdMotion(s.crowd, s.robot.radius)
     else:
-        obstacles = ObstacleMotion(s.obstacles)
+        obstacles = ObstacleMotion(walking(s))
     control = replace(
         s.control,
         speed=s.robot.speed,
@@ -209,5 +210,7 @@ def make_navigation_diagram(
     systems = {"scene_graph": scene_graph, "arena": arena} | blocks
     sensed = scenario.senses == "lidar"
     wires = [*(SENSED if sensed else GIVEN), *WIRES]
+    if scenario.crowd.people:
+        wires.append(("robot.y0", "obstacles.robot"))
     exports = EXPORTS | (SENSED_EXPORTS if sensed else {})
     return finish(builder, "navigation", systems, wires, exports, scenario.faults)

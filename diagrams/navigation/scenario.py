@@ -1,13 +1,16 @@
 """The scenario of a navigation: a robot, its planner, and what is in its way."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 from math import atan2, dist, hypot
+from pathlib import Path
 
 import numpy as np
 
 from diagrams.common.scenario import Scenario, ScenarioError
 from plants.crowd.crowd_motion import CrowdParams, starts
 from plants.crowd.obstacle_motion import FAR, ObstacleParams, obstacle_at
+from plants.crowd.recorded_crowd import load_obsmat
 from plants.crowd.signals import Obstacle
 from plants.crowd.walls import WallParams, segments, wall_distance
 from plants.turtlebot.lidar import LidarParams
@@ -54,6 +57,12 @@ class NavigationScenario(Scenario):
     obstacles: list[ObstacleParams] = parameter(
         [], "discs and how they move", shape=(-1,)
     )
+    recording: str = parameter(
+        "", "people filmed, `obsmat.txt` of ETH or UCY, for obstacles", file=True
+    )
+    recording_start: float = parameter(
+        0.0, "of the time that is played, since the first frame", "s", least=0, most=1e5
+    )
     walls: list[WallParams] = parameter([], "what stands, seen by lidar", shape=(-1,))
     crowd: CrowdParams = part(CrowdParams)
     senses: str = parameter(
@@ -81,11 +90,26 @@ def heading(scenario: NavigationScenario) -> float:
     return atan2(gy - y, gx - x)
 
 
+def walking(scenario: NavigationScenario) -> list[ObstacleParams]:
+    """The obstacles of a scenario, or the people of its recording."""
+    if scenario.recording:
+        return _filmed(scenario.recording, scenario.recording_start, scenario.duration)
+    return scenario.obstacles
+
+
+@cache
+def _filmed(file: str, start: float, duration: float) -> list[ObstacleParams]:
+    try:
+        return load_obsmat(Path(file), start, duration)
+    except (OSError, ValueError) as error:
+        raise ScenarioError(f"recording={file!r}: {error}") from error
+
+
 def discs(scenario: NavigationScenario) -> list[Obstacle]:
     """Everything in the way at time zero."""
     if scenario.crowd.people:
         return starts(scenario.crowd)
-    return [obstacle_at(params, 0.0) for params in scenario.obstacles]
+    return [obstacle_at(params, 0.0) for params in walking(scenario)]
 
 
 def mapping_params(scenario: NavigationScenario) -> GridMappingParams:
@@ -108,8 +132,11 @@ def companions(scenario: NavigationScenario) -> dict[str, NavigationScenario]:
 
 def check(scenario: NavigationScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    if scenario.crowd.people and scenario.obstacles:
-        raise ScenarioError("obstacles and crowd.people: expected one of them")
+    given = [bool(scenario.crowd.people), bool(scenario.obstacles)]
+    if sum([*given, bool(scenario.recording)]) > 1:
+        raise ScenarioError(
+            "obstacles, crowd.people and recording: expected one of them"
+        )
     way = dist(scenario.start, scenario.goal)
     if way <= scenario.reach:
         raise ScenarioError(
@@ -171,7 +198,7 @@ def _check_room(scenario: NavigationScenario) -> None:
                 f"obstacles[{index}]: {gap:.3g} m from its centre, expected at least "
                 f"{radius + safe:.3g}"
             )
-        still = not scenario.crowd.people and _stands(scenario.obstacles[index])
+        still = not scenario.crowd.people and _stands(walking(scenario)[index])
         gap = dist((x, y), scenario.goal)
         if still and gap < radius + body:
             raise ScenarioError(
@@ -193,7 +220,7 @@ def outruns(scenario: NavigationScenario) -> list[int]:
     No method can promise to avoid those; the robot still does its best.
     """
     found = []
-    for index, obstacle in enumerate(scenario.obstacles):
+    for index, obstacle in enumerate(walking(scenario)):
         times = obstacle.times if obstacle.motion == "waypoints" else [0.0]
         moves = [obstacle_at(obstacle, t) for t in times]
         if max(hypot(o.v_x, o.v_y) for o in moves) >= scenario.robot.speed:

@@ -18,16 +18,28 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.inverse_kernels import REACHED, solve_tool
+from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
 from plants.snake.tool_target import seen_from, target_of
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import Pose, along, pose_of, row_of
+from systems.common.geometry import (
+    Pose,
+    along,
+    inwards,
+    norm,
+    outwards,
+    plus,
+    pose_of,
+    row_of,
+    sub,
+)
 from systems.common.parameter import check, parameter
 from systems.common.signal import finiteness, flat, reader, size, writer
 from systems.common.step_block import StepBlock
 from systems.keyhole.phases import Phases
-from systems.keyhole.signals import Phase, SnakeStatus, TubePose
+from systems.keyhole.signals import BodyDeviation, Phase, SnakeStatus, TubePose
 from systems.resection.wires.procedure_player import (
     ProcedurePlayerParams,
     Profile,
@@ -38,6 +50,8 @@ from systems.sensing.organ_estimator import OrganMotion
 
 Floats = np.ndarray
 _ALONG = (0.0, 0.0, 1.0)
+FAR = 0.1
+"""Deviation in m of a body that cannot be where it should."""
 read_tube, read_organ = reader(TubePose), reader(OrganMotion)
 finite_tube, finite_organ = finiteness(TubePose), finiteness(OrganMotion)
 write_target = writer(ToolTarget)
@@ -206,23 +220,64 @@ def _tool(c: Any, plan: Any, now: Way) -> ToolTarget:
 
 
 @compiled
+def body_deviation(
+    x: Floats, C: Pose, E: Pose, h: float, tool: float, bend: float
+) -> float:
+    """How far the body in the organ is from where a posture has it, in m.
+
+    The inverse kinematics keeps tool and intermediate axis where they are to be in E,
+    so what lies before them bends otherwise once C and E are apart.
+
+    Args:
+        x: The posture in E, (7,).
+        C: The channel.
+        E: The entry.
+        h: Half the pitch.
+        tool: The tool's offset.
+        bend: Largest of a ball.
+    """
+    a, b, q = np.empty((POINTS, 3)), np.empty((POINTS, 3)), np.empty(7)
+    corners(x, h, tool, a)
+    p, n, m = seen_from(target_of(x, h, tool), E, C)
+    axes = np.array(p), np.array(n), np.array(m)
+    if solve_tool(*axes, h, tool, bend, (-1.0, 1.0), q) != REACHED:
+        return FAR
+    corners(q, h, tool, b)
+    most, before = 0.0, (0.0, 0.0, 0.0)
+    for i in range(POINTS - 1):
+        in_W = plus(C.p, outwards(C, row_of(b, i)))
+        off = sub(inwards(E, sub(in_W, E.p)), row_of(a, i))
+        if a[i, 2] > 0.0:
+            if i > 0 and a[i - 1, 2] < 0.0:  # where the body passes the entry
+                share = -a[i - 1, 2] / (a[i, 2] - a[i - 1, 2])
+                most = norm(along(before, share, sub(off, before)))
+            most = max(most, norm(off))
+        before = off
+    return most
+
+
+@compiled
 def _aim(
     constants: Floats, plan: Any, way: Floats, held: Floats, tube: Floats, organ: Floats
-) -> Floats:
-    """The elements of the target in C."""
+) -> tuple[Floats, float]:
+    """The elements of the target in C, and how far the body is from the plan."""
     c, at, entry = constants[0], read_tube(tube), read_organ(organ)
     if not (finite_tube(at) and finite_organ(entry)):
-        return held.copy()
+        return held.copy(), FAR
     now, out, over = Way(way[0], way[1], way[2]), c.ends[0], c.ends[1]
     z = c.inside + c.speed * min(now.way, out) + c.length
     in_tube = write_target(ToolTarget((0.0, 0.0, z), _ALONG, _ALONG))
-    if now.way <= out:
-        return in_tube
     E = pose_of(entry.p, row_of(c.axes, 0), row_of(c.axes, 1))
+    C = pose_of(along(at.p, c.gap, at.z), at.x, at.z)
     if c.follow == 0.0:
-        E = pose_of(along(at.p, c.gap, at.z), E.x, at.z)
+        E = pose_of(C.p, E.x, at.z)
+    x = posture_on(plan, c.turn, now.clock)
+    away = body_deviation(x, C, E, c.half_pitch, c.tool_offset, c.max_bend)
+    if now.way <= out:
+        return in_tube, away
     told = write_target(in_channel(_tool(c, plan, now), E, at, c.gap))
-    return in_tube + smooth((now.way - out) / (over - out)) * (told - in_tube)
+    share = smooth((now.way - out) / (over - out))
+    return in_tube + share * (told - in_tube), away
 
 
 @compiled
@@ -245,6 +300,8 @@ class SnakeTask(StepBlock):
     Port ``reference`` emits the `ToolPose` in E of this instant.
 
     Port ``status`` emits the `SnakeStatus`.
+
+    Port ``deviation`` emits the `BodyDeviation` of the posture that is next.
     """
 
     def __init__(
@@ -303,6 +360,7 @@ class SnakeTask(StepBlock):
             turn=plan.turn,
             half_pitch=snake.half_pitch,
             tool_offset=snake.tool_offset,
+            max_bend=snake.max_bend,
         )
         self._plan = plan.arrays
         self._tube = self.signal_in("tube", TubePose)
@@ -316,9 +374,9 @@ class SnakeTask(StepBlock):
         self._next = self.cached("next", go, state | on)
         reads = {*state, *on, self._tube.ticket(), self._organ.ticket()}
         self._target = self.cached("target", self._calc_target, reads)
-        self.signal_out(
-            "target", ToolTarget, self._target.Eval, {self._target.ticket()}
-        )
+        aimed = {self._target.ticket()}
+        self.signal_out("target", ToolTarget, self._calc_aim, aimed)
+        self.signal_out("deviation", BodyDeviation, self._calc_deviation, aimed)
         self.signal_out("reference", ToolPose, self._calc_reference, state)
         last = size(Way)
         self._emit(self._next, {"status": SnakeStatus}, last)
@@ -326,7 +384,7 @@ class SnakeTask(StepBlock):
             p.period,
             lambda context: [
                 self._next.Eval(context)[:last],
-                self._target.Eval(context),
+                self._calc_aim(context),
             ],
         )
 
@@ -340,7 +398,16 @@ class SnakeTask(StepBlock):
         """Least time in s from the gate to the plan's end, and home again."""
         return self._least
 
-    def _calc_target(self, context: Any) -> Floats:
+    def _calc_aim(self, context: Any) -> Floats:
+        target: Floats
+        target, _ = self._target.Eval(context)
+        return target
+
+    def _calc_deviation(self, context: Any) -> list[float]:
+        _, away = self._target.Eval(context)
+        return [away]
+
+    def _calc_target(self, context: Any) -> tuple[Floats, float]:
         return _aim(
             self._constants,
             self._plan,

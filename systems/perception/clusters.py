@@ -16,7 +16,7 @@ from plants.turtlebot.lidar import RAYS, STEP
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import compiled
 from systems.common.signal import reader, row_writer, size
-from systems.perception.grid import stands
+from systems.perception.grid import RELIABLE, SETTLED, stands
 
 CUSP = 0.05
 """Depth of a notch between two things [m]: a body bulges, it has none."""
@@ -36,10 +36,11 @@ class Cluster(NamedTuple):
     y: float
     radius: float
     hidden: float  # one of the above
-    known: float  # 1 if most of it belongs to what was there before
+    known: float  # 1 if most of it was there before, 2 if it was for long
     near: float  # range of its nearest part, m
     right: float  # bearings of its ends in the world, rad
     left: float
+    cut: float  # 1 if another begins where it ends
 
 
 read_cluster, write_cluster = reader(Cluster), row_writer(Cluster)
@@ -54,6 +55,7 @@ def circle_of(
     first: int,
     last: int,
     known: float,
+    cut: float,
 ) -> Cluster:
     """The circle of a run of rays, `last` included; dropouts in it do not count."""
     near = 1e9
@@ -84,7 +86,7 @@ def circle_of(
     hidden = 1.0 * (0.0 < before < near) + 2.0 * (0.0 < after < near)
     right = place.theta + (first - 0.25) * STEP
     left = place.theta + (last + 0.25) * STEP
-    return Cluster(x, y, radius, hidden, known, near, right, left)
+    return Cluster(x, y, radius, hidden, known, near, right, left, cut)
 
 
 @compiled
@@ -107,14 +109,15 @@ def clusters(
         jump = abs(scan[k, 0] - scan[k - 1, 0])
         if jump > widest:
             start, widest = k, jump
-    k, end = start, start + RAYS
+    k, end, touches = start, start + RAYS, False
     while k < end:
         if scan[k % RAYS, 0] == 0.0:
             k += 1
             continue
         first, last, r = k, k, scan[k % RAYS, 0]
-        known = total = 0
+        known = total = sure = 0
         low, peak, cusp = r, r, k
+        cut, touches = touches, False
         while k < end and k - last <= 2:  # one dropout ends no cluster
             s = scan[k % RAYS, 0]
             if s > 0.0:
@@ -122,6 +125,7 @@ def clusters(
                     break
                 if peak - low > CUSP and peak - s > CUSP:
                     last = cusp  # two that touch, or the corner of a room
+                    cut = touches = True
                     break
                 if s < low:
                     low, peak, cusp = s, s, k
@@ -130,14 +134,15 @@ def clusters(
                 last, r = k, s
                 a = place.theta + k * STEP
                 total += 1
-                if stands(params, grid, place.x + s * cos(a), place.y + s * sin(a)):
-                    known += 1
+                odds = stands(params, grid, place.x + s * cos(a), place.y + s * sin(a))
+                known += 1 if odds >= SETTLED else 0
+                sure += 1 if odds >= RELIABLE else 0
             k += 1
         k = last + 1
         if total < 2 or count == MOST:
             continue
-        old = 1.0 if 2 * known > total else 0.0
-        circle = circle_of(params, place, scan, first, last, old)
+        old = 1.0 * (2 * known > total) + 1.0 * (2 * sure > total)
+        circle = circle_of(params, place, scan, first, last, old, 1.0 * cut)
         away = hypot(circle.x - place.x, circle.y - place.y)
         if circle.radius > params.largest or away > params.farthest:
             continue
@@ -170,12 +175,13 @@ def people(params: Any, found: np.ndarray) -> np.ndarray:
             o = read_cluster(found[mate])
             x, y, known = 0.5 * (x + o.x), 0.5 * (y + o.y), min(known, o.known)
             hidden = 1.0 * SEEN
-            nobody = Cluster(o.x, o.y, 0.0, o.hidden, o.known, o.near, o.right, o.left)
+            nobody = Cluster(o.x, o.y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             write_cluster(found, mate, nobody)
         elif leg[i]:
             hidden = 1.0 * LEG
         radius = max(c.radius, params.person)
-        person = Cluster(x, y, radius, hidden, known, c.near, c.right, c.left)
+        ends = (c.near, c.right, c.left, c.cut)
+        person = Cluster(x, y, radius, hidden, known, *ends)
         write_cluster(rows, count, person)
         count += 1
     return rows[:count]

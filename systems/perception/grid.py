@@ -111,19 +111,20 @@ def absorb(
 
 
 @compiled
-def stands(params: Any, grid: np.ndarray, x: float, y: float) -> bool:
-    """Whether a point belongs to what has long been known to stand."""
+def stands(params: Any, grid: np.ndarray, x: float, y: float) -> float:
+    """The log of odds of what a point belongs to, 0 if it is new there."""
+    most = 0.0
     c = cell_of(params, x, y)
     if c < 0:
-        return False
+        return most
     for i in range(-1, 2):
         for j in range(-1, 2):
             k = c + i * CELLS + j
             if k < 0 or k >= len(grid) or grid[k, 0] < SETTLED:
                 continue
             if hypot(grid[k, 1] - x, grid[k, 2] - y) < params.cell:
-                return True
-    return False
+                most = max(most, grid[k, 0])
+    return most
 
 
 @compiled

@@ -22,8 +22,8 @@ from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import reader, row_writer, size
-from systems.perception.clusters import LEG, clusters, read_cluster, seen_as
 from systems.perception.clusters import SEEN as WHOLE
+from systems.perception.clusters import clusters, read_cluster, seen_as
 from systems.perception.grid import standing, stands
 from systems.perception.grid_mapping import SCAN_PERIOD, GridMappingParams
 from systems.perception.grid_mapping import constants as grid_constants
@@ -249,7 +249,11 @@ def corrected(
         v_x, v_y = t.v_x + kv * (x - t.x), t.v_y + kv * (y - t.y)
         speed = hypot(v_x, v_y)
         far = hypot(t.x - t.stood_x, t.y - t.stood_y) > params.strays
-        if t.moves > 0.0:
+        # A wall's end that comes out of a shadow grows, and only seems to move.
+        strip = c.cut > 0.0 and c.hidden != WHOLE and t.moves == 0.0
+        if c.known > 1.0 or strip:  # where it stood long enough it still is
+            moves = False
+        elif t.moves > 0.0:
             moves = speed > params.stops
         else:
             moves = t.hits >= 4.0 and (far or speed > params.starts)
@@ -267,8 +271,7 @@ def corrected(
                 (1.0 - kp) * t.pv,
                 t.vv - kv * t.pv,
                 t.radius + gain * (c.radius - t.radius),
-                # What comes out of a shadow grows, and only seems to move.
-                t.hits + (1.0 if c.hidden == WHOLE or c.hidden == LEG else 0.25),
+                0.25 if strip else t.hits + 1.0,
                 0.0,
                 1.0 if moves else 0.0,
                 t.stood_x if moves or t.moves == 0.0 else x,
@@ -291,7 +294,7 @@ def corrected(
             continue
         last += 1.0
         sigma = params.noise if c.hidden == WHOLE else params.hidden_noise
-        hits = 1.0 if c.hidden == WHOLE or c.hidden == LEG else 0.25
+        hits = 0.25 if c.cut > 0.0 and c.hidden != WHOLE else 1.0
         sure = (sigma**2, 0.0, 1.0, c.radius, hits, 0.0, 0.0)
         new = Track(last, c.x, c.y, 0.0, 0.0, *sure, c.x, c.y)
         write_track(rows, free, new)
@@ -437,7 +440,7 @@ def corners(
             for n in range(1, 4):  # a single ray may be a dropout
                 s = rays[(k + side * n) % RAYS, 0]
                 open_ = open_ and (s == 0.0 or s > r + p.hides)
-            if open_ and count < EDGES and stands(p, rows, x, y):
+            if open_ and count < EDGES and stands(p, rows, x, y) > 0.0:
                 write_corner(found, count, Corner(1.0, x, y))
                 count += 1
     return found.ravel()

@@ -19,7 +19,7 @@ from systems.common.signals import ToolMotion
 from systems.keyhole.phases import Phases
 from systems.keyhole.signals import Phase, SnakeStatus, TubePose, TubeStatus
 from systems.keyhole.snake_load import weight_of
-from systems.keyhole.snake_task import SnakeTask, in_channel
+from systems.keyhole.snake_task import SnakeTask, body_deviation, in_channel
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask, TubeTaskParams
 from systems.sensing.organ_estimator import OrganMotion
@@ -115,6 +115,20 @@ def test_the_snake_makes_up_for_the_tube():
     _, after = played.play(Phases.RESECT, 1e-9)
     # C's z axis is the world's -z, its y axis the world's -y.
     np.testing.assert_allclose(after.p - before.p, [0.002, 0.001, -0.003], atol=2e-4)
+
+
+def test_the_body_leaves_its_plan_as_the_tube_does():
+    """Some 0.04 mm a degree, and a third of how far it stands aside."""
+    x = np.array([-0.01, 0.2, -0.3, 0.3, 0.2, 0.4, -0.1])
+    E = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    snake = SnakeParams()
+    geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
+    assert body_deviation(x, E, E, *geometry) < 1e-12
+    c, s = np.cos(np.radians(1.0)), np.sin(np.radians(1.0))
+    tilted = Pose((0.0, 0.0, 0.0), (c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c))
+    assert 2e-5 < body_deviation(x, tilted, E, *geometry) < 6e-5
+    aside = E._replace(p=(5e-4, 0.0, 0.0))
+    assert 1e-4 < body_deviation(x, aside, E, *geometry) < 2e-4
 
 
 def test_a_stop_draws_the_tool_back():
