@@ -18,7 +18,7 @@ from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from diagrams.gauze.tools import OBSTACLE, HandTool, hands
 from plants.surgeon.hunting_tool import HuntingTool
-from plants.surgeon.surgeon_tool import SurgeonTool
+from plants.surgeon.surgeon_tool import Patient, SurgeonTool
 from systems.auto_guidance.backward_movement import BackwardMovement
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
 from systems.auto_guidance.go_to_target import GoToTarget
@@ -68,6 +68,7 @@ WIRES = (
     ("endoscope.view_cone", "clearance_constraint.view_cone"),
     # The guide point's velocity becomes tool motion, then joint motion.
     ("clearance_constraint.v_safe", "tool_navigation.v_R"),
+    ("clearance_constraint.status", "tool_navigation.clearance"),
     ("go_to_target.guide", "tool_navigation.guide"),
     ("robot_location.robot_tool", "tool_navigation.robot_tool"),
     ("obstacles.estimates", "tool_navigation.obstacles"),
@@ -171,9 +172,12 @@ EXTRA_EXPORTS = {"planner.way": "go_to_target.way"}
 """Outputs that only the bypass has."""
 
 
-def make_tool(tool: HandTool) -> Any:
+def make_tool(tool: HandTool, scenario: GauzeScenario) -> Any:
     """The block of a tool in the surgeon's hand."""
-    return HuntingTool(tool, tool.hunt) if tool.hunt.speed else SurgeonTool(tool)
+    if tool.hunt.speed:
+        return HuntingTool(tool, tool.hunt)
+    patient = Patient(scenario.wall_motion.excursion, scenario.duration)
+    return SurgeonTool(tool, patient)
 
 
 def aliases(scenario: GauzeScenario) -> dict[str, str]:
@@ -220,7 +224,7 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
     for name, tool in tools.items():
-        blocks[f"{name}_tool"] = make_tool(tool)
+        blocks[f"{name}_tool"] = make_tool(tool, s)
         blocks[f"{name}_estimator"] = TrajectoryEstimator(
             replace(
                 s.estimator,

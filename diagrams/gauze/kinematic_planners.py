@@ -38,7 +38,12 @@ SPEED = ROBOT.max_speed
 NO_CONE = ViewCone((0.0, 0.0, 0.2), (0.0, 0.0, -1.0), 3.2)
 """A view cone that holds everything: there is no camera in the scenes."""
 ROOM = workspace.constants(
-    ReachLimits(min_insertion=ROBOT.least_insertion, max_insertion=0.5, max_tilt=3.1),
+    ReachLimits(
+        min_insertion=ROBOT.least_insertion,
+        max_insertion=0.5,
+        max_tilt=3.1,
+        wrist_speed=100.0,
+    ),
     WorkspaceParams(floor=-0.065),
 )[0]
 """The scenes' workspace."""
@@ -223,6 +228,7 @@ class Constrained:
             wanted,
             tools,
             self._dodging,
+            np.zeros((1 + len(tools), 3)),
         )
         self.seconds.append(time.perf_counter() - start)
         if status.near:

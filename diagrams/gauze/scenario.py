@@ -21,6 +21,7 @@ from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
+from plants.surgeon.synthetic_hand import SyntheticHand
 from systems.auto_guidance.backward_movement import BackwardMovementParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams
@@ -143,7 +144,14 @@ def withdrawn(tool: HandTool) -> HandTool:
     x, y, z = tool.p_WG
     inside = [[x, y, z - WITHDRAWN]]
     return replace(
-        tool, times=[0.0], points=inside, recording=None, pushes=[], hunt=Hunt()
+        tool,
+        times=[0.0],
+        points=inside,
+        recording=None,
+        pushes=[],
+        hunt=Hunt(),
+        hand=SyntheticHand(),
+        carried=[0.0, 0.0, 0.0],
     )
 
 
@@ -177,6 +185,11 @@ def check_tools(scenario: GauzeScenario) -> None:
             raise ScenarioError(
                 f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with a "
                 "recording"
+            )
+        if tool.hunt.speed and (tool.breathes or tool.hand.seed):
+            raise ScenarioError(
+                f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with "
+                "breathing or a synthetic hand"
             )
         if tool.recording:
             second = float(load_recording(tool.recording)[0][1])

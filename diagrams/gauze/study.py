@@ -18,10 +18,10 @@ from plants.abdomen.wall_force import FulcrumError
 from plants.arm.signals import Posture
 from plants.instruments.clearance import Gap, column
 from systems.auto_guidance.fuzzy_arbiter import Weights
-from systems.bypass.clearance_constraint import ClearanceStatus
 from systems.bypass.tool_bypass import Way
 from systems.common.signal import Many
 from systems.common.signals import (
+    ClearanceStatus,
     Estimate,
     Force,
     Guide,
