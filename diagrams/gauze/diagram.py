@@ -12,7 +12,7 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
+from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
@@ -115,7 +115,6 @@ TOLD = (
 """The wires that the passive wrist takes the place of."""
 
 EMULATED = (
-    *WRIST_WIRES,
     ("passive_wrist.pivot", "robot_location.fulcrum"),
     ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("tool_navigation.tool", "passive_wrist.tool_wanted"),
@@ -252,8 +251,12 @@ def wiring(
     wires = [*WIRES, *tool_wires(scenario)]
     exports = EXPORTS | tool_exports(scenario)
     if scenario.emulated:
-        wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
-        exports |= WRIST_EXPORTS
+        wires = [
+            *(wire for wire in wires if wire not in TOLD),
+            *EMULATED,
+            *wrist_wires(scenario),
+        ]
+        exports |= wrist_exports(scenario)
     wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)

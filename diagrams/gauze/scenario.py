@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import WristSettings, check_wrist
+from diagrams.bedside.wrist import TipSettings, WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.gauze.tools import (
     CAMERA,
@@ -49,7 +49,7 @@ BEHAVIOURS = ("bypass", "field")
 
 
 @dataclass
-class GauzeScenario(Scenario, WristSettings):
+class GauzeScenario(Scenario, WristSettings, TipSettings):
     """Auto-guided movements (section 5 of the paper): gauze to the surgeon."""
 
     known_fulcrums: bool = parameter(

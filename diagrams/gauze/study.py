@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.bedside.bedside import stiffen
-from diagrams.bedside.wrist import WRIST_SIGNALS
+from diagrams.bedside.wrist import wrist_signals
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
@@ -69,7 +69,7 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
         port: Many(Gap, columns) if port == "clearance" else kind
         for port, kind in SIGNALS.items()
     }
-    ports |= WRIST_SIGNALS if scenario.emulated else {}
+    ports |= wrist_signals(scenario) if scenario.emulated else {}
     if scenario.behaviour != "bypass":
         del ports["planner.way"]
     return ports

@@ -209,7 +209,7 @@ OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
     *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
-    *("BallLocation", "ToolLoad", "WrenchWatch"),
+    *("BallLocation", "TipLoad", "ToolLoad", "WrenchWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}
