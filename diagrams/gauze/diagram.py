@@ -31,6 +31,7 @@ from systems.motion.endoscope import Endoscope
 from systems.motion.joint_commands import JointCommands
 from systems.motion.tool_navigation import ToolNavigation
 from systems.sensing.optical_tracker import OpticalTracker
+from systems.sensing.registration import Registration
 from systems.sensing.robot_location import RobotLocation
 from systems.sensing.trajectory_estimator import TrajectoryEstimator
 
@@ -93,7 +94,7 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
     for name, tool in hands(scenario.tools, scenario.seed).items():
         wires += [
             (f"{name}_tool.shaft", f"optical_tracker.{name}"),
-            (f"optical_tracker.{name}_measured", f"{name}_estimator.measurement"),
+            *seen(name, scenario.registration.active),
             (f"{name}_tool.shaft", f"posed_tools.{name}"),
             (f"{name}_tool.shaft", f"clearance.{name}"),
         ]
@@ -106,6 +107,25 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
         ]
     return wires
 
+
+def seen(name: str, registered: bool) -> list[tuple[str, str]]:
+    """The wires from the tracker to a tool's estimator."""
+    measured, wanted = (
+        f"optical_tracker.{name}_measured",
+        f"{name}_estimator.measurement",
+    )
+    if not registered:
+        return [(measured, wanted)]
+    mended = f"registration.{name}"
+    return [(measured, f"{mended}_measured"), (mended, wanted)]
+
+
+REGISTERED = (
+    ("tool_shaft.shaft", "optical_tracker.robot"),
+    ("optical_tracker.robot_measured", "registration.robot_measured"),
+    ("plant.pa10_state", "registration.arm_state"),
+)
+"""The tracker sees the robot's own tool as well."""
 
 TOLD = (
     ("fulcrum.y0", "robot_location.fulcrum"),
@@ -199,12 +219,13 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
     s = scenario
     tools = hands(s.tools, s.seed)
     obstacles = [name for name, tool in tools.items() if tool.role == OBSTACLE]
+    shown = [*tools, "robot"] if s.registration.active else [*tools]
     # The planner knows the limits of the navigation behind it.
     around = (s.margins, s.navigation, s.workspace)
     blocks: dict[str, Any] = {
-        "optical_tracker": OpticalTracker(s.tracker, list(tools)),
+        "optical_tracker": OpticalTracker(s.tracker, shown),
         "tracker_noise": RandomSource(
-            RandomDistribution.kGaussian, 6 * len(tools), s.tracker.period
+            RandomDistribution.kGaussian, 6 * len(shown), s.tracker.period
         ),
         "endoscope": Endoscope(s.camera),
         "robot_location": RobotLocation(s.instrument),
@@ -234,6 +255,13 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         )
     if len(obstacles) > 1:
         blocks["obstacle_estimates"] = Multiplexer([size(Estimate)] * len(obstacles))
+    if s.registration.active:
+        blocks["registration"] = Registration(
+            replace(s.registration, period=s.tracker.period),
+            list(tools),
+            s.tracker.body,
+            s.instrument,
+        )
     if not s.emulated:
         blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
     return blocks
@@ -257,6 +285,9 @@ def wiring(
             *wrist_wires(scenario),
         ]
         exports |= wrist_exports(scenario)
+    if scenario.registration.active:
+        wires += REGISTERED
+        exports |= {"tracker.alignment": "registration.alignment"}
     wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)

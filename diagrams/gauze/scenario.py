@@ -42,6 +42,7 @@ from systems.motion.tool_navigation import (
     reachable,
 )
 from systems.sensing.optical_tracker import OpticalTrackerParams
+from systems.sensing.registration import RegistrationParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 BEHAVIOURS = ("bypass", "field")
@@ -68,6 +69,7 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
         False, "whether the paper's planner is run as well and drawn beside it"
     )
     tracker: OpticalTrackerParams = part(OpticalTrackerParams)
+    registration: RegistrationParams = part(RegistrationParams)
     estimator: TrajectoryEstimatorParams = part(TrajectoryEstimatorParams)
     margins: Margins = part(Margins)
     workspace: WorkspaceParams = part(WorkspaceParams)

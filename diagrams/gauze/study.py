@@ -33,6 +33,7 @@ from systems.common.signals import (
 )
 from systems.motion.joint_commands import Status
 from systems.motion.tool_navigation import StopCode
+from systems.sensing.registration import Alignment
 
 SIGNALS = {
     "planner.guide": Guide,
@@ -70,6 +71,8 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
         for port, kind in SIGNALS.items()
     }
     ports |= wrist_signals(scenario) if scenario.emulated else {}
+    if scenario.registration.active:
+        ports["tracker.alignment"] = Alignment
     if scenario.behaviour != "bypass":
         del ports["planner.way"]
     return ports

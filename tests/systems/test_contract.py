@@ -41,6 +41,7 @@ BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
+    "gauze_dynamic_real": [],
     "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
@@ -209,7 +210,7 @@ OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
     *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
-    *("BallLocation", "TipLoad", "ToolLoad", "WrenchWatch"),
+    *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}
