@@ -95,8 +95,6 @@ class JointCommandsParams:
 _STILL = (0.0, 0.0, 0.0)
 _FREE = flat(FREE)
 _YIELD = 0.7
-_WAKING = 1.0
-"""In which an arm that was limp comes back to its full speed of catching up, s."""
 _GIVE_WAY = (float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST))
 
 
@@ -146,7 +144,6 @@ def problem(
     time: float,
     tool: ToolMotion,
     fulcrum: Point,
-    awake: float,
 ) -> tuple[np.ndarray, ...]:
     """The quadratic program of an instant, as `joint_velocity` takes it.
 
@@ -160,15 +157,13 @@ def problem(
         time: Now [s].
         tool: The command.
         fulcrum: The shaft's; the tip stands for it if it is no number.
-        awake: How long the arm has not been limp [s].
 
     Returns:
         J, V, v_nominal, low, high; and the torques of the load's weight (7) [Nm].
     """
     period = constants.period
     p_WT, u_WT, J, weight = tool_state(arm, q)
-    fastest = constants.catch_up * min(1.0, max(0.05, awake / _WAKING))
-    twist = (p_WT, u_WT, tool, time, period, constants.gain, fastest)
+    twist = (p_WT, u_WT, tool, time, period, constants.gain, constants.catch_up)
     w, v = tool_twist(*twist)
     lever = _STILL
     if all_finite(fulcrum.p):
@@ -197,10 +192,9 @@ def _problem(
     time: float,
     tool: np.ndarray,
     fulcrum: np.ndarray,
-    rest: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     told = read_tool(tool), read_point(fulcrum)
-    return problem(record[0], arm[0], q, time, told[0], told[1], -rest[0])
+    return problem(record[0], arm[0], q, time, told[0], told[1])
 
 
 @compiled
@@ -248,20 +242,17 @@ def _free_step(
 ) -> tuple[np.ndarray, np.ndarray, Status, float, float]:
     """What `command` gives, how long the arm stays limp, and whether that is final.
 
-    How long it stays limp is negative while it is awake. It is final, 1, unless the
-    free minimum does not keep the bounds, 0.
+    It is 1 if it is, and 0 if the free minimum does not keep the bounds.
     """
     if not finite_motion(tool):  # hold still
         weight = tool_state(arm, q)[3]
-        return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (rest[0], 1.0)
-    J, V, v_nominal, low, high, weight = problem(
-        constants, arm, q, time, tool, fulcrum, -rest[0]
-    )
+        return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (0.0, 1.0)
+    J, V, v_nominal, low, high, weight = problem(constants, arm, q, time, tool, fulcrum)
     q_m, v_m = np.array(measured.q), np.array(measured.v)
     if not finite_state(measured):  # unseen it is where it was told to be
         q_m, v_m = q, np.zeros(JOINTS)
     strayed = np.abs(product(J[3:], q - q_m)).max() / constants.fulcrum_first
-    left = max(rest[0] - constants.period, -_WAKING)
+    left = max(rest[0] - constants.period, 0.0)
     if strayed > constants.follow:
         left = constants.limp_time
     if left > 0.0 or permission.code in _GIVE_WAY:
@@ -276,7 +267,7 @@ def _free_step(
     for i in range(JOINTS):
         if not low[i] <= v[i] <= high[i]:
             is_free = 0.0
-    return command(constants, q, v, weight, shortfall) + (left, is_free)
+    return command(constants, q, v, weight, shortfall) + (0.0, is_free)
 
 
 class JointCommands(Block):
@@ -341,7 +332,7 @@ class JointCommands(Block):
         start = command(self._constants[0], nominal, np.zeros(JOINTS), weight, 0.0)
         for (name, signal), state in zip(signals.items(), start, strict=True):
             self.state_out(name, signal, flat(state))
-        self.DeclareDiscreteState([-_WAKING])  # s that it stays limp
+        self.DeclareDiscreteState(1)  # s that it stays limp
         ports = (self._tool, self._fulcrum, self._measured, self._permission)
         reads = {self.xd_ticket(), self.time_ticket(), *(p.ticket() for p in ports)}
         self._next = self.cached("next", self._calc_next, reads)
@@ -370,7 +361,7 @@ class JointCommands(Block):
         )
         if step[-1]:
             return step[:JOINTS], step[JOINTS:-3], step[-3:-2], step[-2:-1]
-        J, V, *bounds, weight = _problem(constants, arm, q, time, tool, fulcrum, rest)
+        J, V, *bounds, weight = _problem(constants, arm, q, time, tool, fulcrum)
         v = joint_velocity(J, V, *bounds)
         short = missing(constants[0], J, v, V)
         return *command(constants[0], q, v, weight, short), step[-2:-1]
