@@ -236,6 +236,29 @@ class Constrained:
         return v
 
 
+TRAVEL = 0.06
+"""How fast the robot at the bedside travels; it evades faster, m/s."""
+
+
+def traveller(params: ClearanceConstraintParams) -> Constrained:
+    """A fresh planner that travels at `TRAVEL` and evades as the constraint does."""
+    inner = Bypass(
+        go=GoToTargetParams(max_speed=TRAVEL),
+        arbiter=FuzzyArbiterParams(max_speed=TRAVEL),
+        bypass=ToolBypassParams(max_speed=TRAVEL),
+    )
+    return Constrained(inner, params)
+
+
+def robot_of(params: ClearanceConstraintParams) -> Robot:
+    """The ideal robot that is as fast as its constraint reckons with."""
+    return Robot(
+        max_speed=params.max_speed,
+        max_turning=params.turning_speed,
+        max_acceleration=params.acceleration,
+    )
+
+
 FIELD: dict[str, Any] = {
     "go": GoToTargetParams(max_speed=SPEED),
     "arbiter": FuzzyArbiterParams(max_speed=SPEED),

@@ -3,7 +3,7 @@
 R travels at 60 mm/s, and gets out of the way at up to 250 mm/s along its shaft, 1 rad/s
 and 4 m/s^2. "slow" is R as it was: 100 mm/s in everything. "condition" counts the
 scenes in which the evasion condition failed at some instant, and of the contacts those
-among them; "unavoidable" those that a robot told the future would have touched in as well.
+among them; "unavoidable" those in which a robot told the future is touched as well.
 """
 
 from dataclasses import dataclass
@@ -12,14 +12,10 @@ import numpy as np
 
 from diagrams.gauze.foresight import Reach, unavoidable
 from diagrams.gauze.kinematic_loop import PLANNER_PERIOD, Outcome, Robot, run
-from diagrams.gauze.kinematic_planners import Bypass, Constrained
+from diagrams.gauze.kinematic_planners import robot_of, traveller
 from diagrams.gauze.scenes import CONTACT, Scene, scene
-from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
-from systems.auto_guidance.go_to_target import GoToTargetParams
 from systems.bypass.clearance_constraint import ClearanceConstraintParams
-from systems.bypass.tool_bypass import ToolBypassParams
 
-TRAVEL = 0.06
 SECONDS = 20.0
 FAST = ClearanceConstraintParams()
 SLOW = ClearanceConstraintParams(max_speed=0.1, acceleration=1.0)
@@ -33,15 +29,6 @@ class Result:
     outcome: Outcome
     holds: bool
     unavoidable: bool
-
-
-def robot_of(params: ClearanceConstraintParams) -> Robot:
-    """The ideal robot that is as fast as its constraint reckons with."""
-    return Robot(
-        max_speed=params.max_speed,
-        max_turning=params.turning_speed,
-        max_acceleration=params.acceleration,
-    )
 
 
 def cannot_be_avoided(given: Scene, robot: Robot) -> bool:
@@ -63,14 +50,7 @@ def cannot_be_avoided(given: Scene, robot: Robot) -> bool:
 def run_scene(seed: int, number: int, params: ClearanceConstraintParams) -> Result:
     """Runs a scene to its end."""
     given = scene("hands", seed, number)
-    planner = Constrained(
-        Bypass(
-            go=GoToTargetParams(max_speed=TRAVEL),
-            arbiter=FuzzyArbiterParams(max_speed=TRAVEL),
-            bypass=ToolBypassParams(max_speed=TRAVEL),
-        ),
-        params,
-    )
+    planner = traveller(params)
     robot = robot_of(params)
     outcome = run(given, planner, robot, SECONDS)
     return Result(outcome, planner.holds, cannot_be_avoided(given, robot))
