@@ -1,4 +1,5 @@
-# make setup     the virtual environment .venv (the other targets call it)
+# make setup     the virtual environment .venv (the other targets call it); with LOCKED=1
+#                only files whose digests are in hashes.txt
 # make demo      runs gauze_dynamic: figures, plots and a replay in out/
 # make test      style, types and all tests, JOBS at a time
 # make golden    the figures of all scenarios against the table of golden ones
@@ -17,7 +18,12 @@ setup: .venv/ready
 
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
+ifdef LOCKED
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement hashes.txt
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+else
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+endif
 	touch $@
 
 demo: setup

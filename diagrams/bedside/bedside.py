@@ -96,7 +96,7 @@ def add_bedside(
         bore=bore,
     )
     below = [instrument.instance, abdomen.sleeve_instance, *hang(plant, instrument)]
-    add_scenery(plant, BASE_POSITION)
+    add_scenery(plant, BASE_POSITION, not getattr(scenario, "organs", []))
     plant.Finalize()
     connect_poses(builder, plant, scene_graph)
     moved = motion.displacement(0.0)

@@ -176,15 +176,18 @@ def add_wrist(
         "fulcrum_estimator": FulcrumEstimator(estimator),
         "passive_wrist": PassiveWristEmulation(wrist),
     }
+    systems["wrist_sensor"] = builder.GetSubsystemByName("wrist_sensor")
     if push := bedside.systems.get("tip_push"):
-        felt = builder.GetSubsystemByName("wrist_sensor")
         builder.Connect(
-            push.get_output_port(), felt.GetInputPort("applied_spatial_force")
+            push.get_output_port(),
+            systems["wrist_sensor"].GetInputPort("applied_spatial_force"),
         )
+    new = ["wrench_watch", "fulcrum_estimator", "passive_wrist"]
     tip = getattr(scenario, "tip_load", TipLoadParams())
     if tip.active:
         told = replace(tip, length=scenario.instrument.length, period=sensor.period)
         systems["tip_load"] = TipLoad(told, guess)
-    for name in [*systems][1:]:
+        new.append("tip_load")
+    for name in new:
         builder.AddNamedSystem(name, systems[name])
     return systems

@@ -102,7 +102,7 @@ def cluster(workers: int, scheduler: str = "") -> Iterator[Client]:
             yield client
         return
     try:
-        client = Client(scheduler, timeout="10s")
+        client = Client(scheduler, timeout="5s")
     except (OSError, ValueError) as error:
         raise ScenarioError(
             f"--scheduler {scheduler}: cannot be reached; expected tcp://HOST:PORT"

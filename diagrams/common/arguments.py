@@ -67,6 +67,11 @@ def make_parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--no-replay", action="store_true", help="do not record replay.html"
     )
+    run.add_argument(
+        "--endoscope",
+        action="store_true",
+        help="render what the endoscope saw: endoscope.mp4 and a film strip",
+    )
     compare = commands.add_parser(
         "compare", help="two runs side by side: figures, and signals over each other"
     )

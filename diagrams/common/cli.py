@@ -86,7 +86,8 @@ def run_one(arguments: argparse.Namespace, name: str, out: Path) -> int:
     scenario = load_scenario(
         name, arguments.overrides, arguments.seed, arguments.duration
     )
-    run = run_scenario(scenario, out, not arguments.no_replay, progress_bar)
+    told = (not arguments.no_replay, progress_bar, arguments.endoscope)
+    run = run_scenario(scenario, out, *told)
     if arguments.json:
         print(json.dumps(run.metrics, indent=2))
     else:

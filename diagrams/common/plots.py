@@ -35,7 +35,7 @@ def new_figure(width: float = 7.0, height: float = 4.2) -> Figure:
         return Figure(figsize=(width, height), layout="constrained")
 
 
-def add_axes(figure: Figure, *position: int, **options: Any) -> Any:
+def add_axes(figure: Figure, *position: Any, **options: Any) -> Any:
     """Adds axes in the project's style; arguments as `Figure.add_subplot`."""
     with rc_context(STYLE):
         return figure.add_subplot(*position, **options)

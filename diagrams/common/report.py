@@ -49,6 +49,8 @@ def run_page(run: Any, folder: Path, made_by: dict[str, Any]) -> str:
         parts.append(f"<p><b>Ended early or failed: {escape(error)}</b></p>")
     if (folder / "replay.html").is_file():
         parts.append('<p><a href="replay.html">Replay</a></p>')
+    if (folder / "endoscope.mp4").is_file():
+        parts.append('<p><a href="endoscope.mp4">Film of the endoscope</a></p>')
     parts += ["<h2>Figures</h2>", figures_table(run.metrics)]
     plots = sorted(folder.glob("*.png"))
     parts += ["<h2>Plots</h2>"] if plots else []

@@ -45,6 +45,9 @@ from systems.common.stopwatch import STOPWATCH
 INTERRUPTED = "interrupted"
 """Error of a run that was interrupted."""
 
+LOOKS = 8
+"""One frame in so many is watched by the stopwatch."""
+
 LARGEST_LOG = 2e9
 """Of a run, in bytes."""
 
@@ -294,6 +297,7 @@ def advance(
     station = run.diagram.GetSubsystemByName("station")
     time, frame = 0.0, 0
     while time < duration:
+        STOPWATCH.look(frame % LOOKS == 0, time if frame else -1.0)
         frame += 1
         time = min(frame * period, duration)
         run.study.adjust(run.case, station, simulator.get_mutable_context())
@@ -311,6 +315,7 @@ def run_scenario(
     out: Path,
     with_replay: bool = True,
     progress: Progress = silent,
+    with_film: bool = False,
 ) -> Run:
     """Runs a scenario and writes all its results into a folder.
 
@@ -324,6 +329,11 @@ def run_scenario(
             another run writes to it.
     """
     check_scenario(scenario)
+    if with_film:
+        can_film = get_study(scenario.system).can_film
+        if can_film is None:
+            raise ScenarioError(f"--endoscope: {scenario.system} has no endoscope")
+        can_film()
     with results(out) as into:
         case = prepare(scenario, progress)
         diagram = build(case)
@@ -349,6 +359,9 @@ def run_scenario(
                     meshcat.SetProperty(f"/{replay.FAR}", "visible", False)
                     with into.file("close_up.html") as draft:
                         draft.write_text(meshcat.StaticHtml())
+            if with_film and run.metrics:
+                with survived(run, "film could not be rendered: "):
+                    run.study.film(run, into)
             write_page(run, into)
     return run
 

@@ -68,6 +68,8 @@ class Study:
             and wires, and is there at once.
         gather: Puts plain data of a scenario into the form of its dataclass, in place.
         companions: Scenarios to run beside one, by name; those have none.
+        can_film: Raises ScenarioError where `film` cannot work; None without a camera.
+        film: Writes the film of a run into its results.
     """
 
     name: str
@@ -93,3 +95,5 @@ class Study:
     outline: Callable[[Any], Case] = Case
     gather: Callable[[dict[str, Any]], None] = lambda tree: None
     companions: Callable[[Any], dict[str, Any]] = lambda scenario: {}
+    can_film: Callable[[], None] | None = None
+    film: Callable[[Any, Any], None] = lambda run, into: None

@@ -12,6 +12,7 @@ import yaml
 
 from diagrams.common.scenario import ScenarioError, nearest
 from systems.common.archive import read_regular
+from systems.common.parameter import default_of
 
 BOOL = "tag:yaml.org,2002:bool"
 NAMED = "tools"
@@ -222,7 +223,7 @@ def member(schema: Any, value: Any) -> Any:
         return members[0]
     roles = {role: m for m in members for role in _roles(m)}
     role = value.get("role", next(iter(_roles(members[0])), ""))
-    if role not in roles:
+    if role not in [*roles]:  # a list is no key
         raise ScenarioError(f"role={role!r}: {nearest(str(role), roles)}")
     return roles[role]
 
@@ -233,15 +234,27 @@ def _roles(schema: Any) -> tuple[str, ...]:
     return choices
 
 
-def make(schema: Any, value: Any) -> Any:
-    """The dataclass of plain data that fit it."""
+def make(schema: Any, value: Any, default: Any = None) -> Any:
+    """The dataclass of plain data that fit it.
+
+    Args:
+        schema: The dataclass.
+        value: What is told of it.
+        default: What it is where it is not told; the dataclass's own defaults if None.
+    """
     schema = getattr(schema, "__value__", schema)
     origin = typing.get_origin(schema)
     if isinstance(schema, types.UnionType) or origin is typing.Union:
-        return None if value is None else make(member(schema, value), value)
+        kind = member(schema, value) if value is not None else None
+        return None if value is None else make(kind, value, default)
     if dataclasses.is_dataclass(schema):
         kinds = typing.get_type_hints(schema)
-        made = {key: make(kinds[key], item) for key, item in value.items()}
+        held = default if type(default) is schema else None
+        own = {f.name: default_of(f) for f in dataclasses.fields(schema)}
+        own |= vars(held) if held is not None else {}
+        made = {key: make(kinds[key], item, own[key]) for key, item in value.items()}
+        if held is not None:
+            return dataclasses.replace(held, **made)
         return typing.cast(typing.Callable[..., Any], schema)(**made)
     if origin is list:
         return [make(typing.get_args(schema)[0], item) for item in value]

@@ -14,9 +14,11 @@ from pydrake.systems.primitives import (
 
 from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
+from diagrams.gauze import organs as inside
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from diagrams.gauze.tools import OBSTACLE, HandTool, hands
+from plants.organs.organs import OrganSet
 from plants.surgeon.hunting_tool import HuntingTool
 from plants.surgeon.surgeon_tool import Patient, SurgeonTool
 from systems.auto_guidance.backward_movement import BackwardMovement
@@ -27,6 +29,7 @@ from systems.bypass.clearance_constraint import ClearanceConstraint
 from systems.bypass.tool_bypass import ToolBypass
 from systems.common.signal import size
 from systems.common.signals import Estimate
+from systems.motion.camera_planner import CameraPlanner
 from systems.motion.endoscope import Endoscope
 from systems.motion.joint_commands import JointCommands
 from systems.motion.tool_navigation import ToolNavigation
@@ -149,6 +152,12 @@ EXTRA_WIRES = (
 )
 """Wires to inputs that only the bypass has."""
 
+SEEING = (
+    ("robot_location.robot_tool", "endoscope.robot_tool"),
+    ("obstacles.estimates", "endoscope.obstacles"),
+)
+"""Wires to a camera that plans."""
+
 EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
     "planner.guide": "go_to_target.guide",
@@ -209,12 +218,15 @@ def aliases(scenario: GauzeScenario) -> dict[str, str]:
     }
 
 
-def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
+def make_blocks(
+    scenario: GauzeScenario, posture: Any, organs: OrganSet | None = None
+) -> dict[str, Any]:
     """The blocks of the diagram, by the names that `WIRES` uses.
 
     Args:
         scenario: The parameters.
         posture: Joint positions at the start (7) [rad].
+        organs: What blocks get of the organs; None without any.
     """
     s = scenario
     tools = hands(s.tools, s.seed)
@@ -227,16 +239,18 @@ def make_blocks(scenario: GauzeScenario, posture: Any) -> dict[str, Any]:
         "tracker_noise": RandomSource(
             RandomDistribution.kGaussian, 6 * len(shown), s.tracker.period
         ),
-        "endoscope": Endoscope(s.camera),
+        "endoscope": CameraPlanner(s.camera_planner, s.camera, obstacles, organs)
+        if s.camera_planner.active
+        else Endoscope(s.camera),
         "robot_location": RobotLocation(s.instrument),
-        "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles=obstacles)
+        "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles, organs)
         if s.behaviour == "bypass"
         else GoToTarget(s.go_to_target, obstacles),
         "velocity_corrections": VelocityCorrections(s.velocity_corrections, obstacles),
         "backward_movement": BackwardMovement(s.backward_movement, obstacles),
         "fuzzy_arbiter": FuzzyArbiter(s.fuzzy_arbiter, obstacles),
         "clearance_constraint": ClearanceConstraint(
-            s.clearance_constraint, *around, obstacles=obstacles
+            s.clearance_constraint, *around, obstacles, organs
         ),
         "tool_navigation": ToolNavigation(
             s.navigation, s.robot.p_WP, s.robot.p_WG, obstacles
@@ -288,6 +302,15 @@ def wiring(
     if scenario.registration.active:
         wires += REGISTERED
         exports |= {"tracker.alignment": "registration.alignment"}
+    if scenario.organs:
+        wires = inside.wired(scenario, wires)
+        wires = [wire for wire in wires if has_input(systems, wire[1])]
+        exports |= inside.EXPORTS | (
+            inside.PRESS_EXPORTS if scenario.press.active else {}
+        )
+    if scenario.camera_planner.active:
+        wires += SEEING
+        exports["camera.sight"] = "endoscope.sight"
     wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)
@@ -312,9 +335,15 @@ def make_gauze_diagram(
     """
     builder = DiagramBuilder()
     theatre = add_theatre(builder, scenario)
-    blocks = add_blocks(builder, make_blocks(scenario, theatre.posture), swaps)
+    organs = inside.known_organs(scenario)
+    made = make_blocks(scenario, theatre.posture, organs)
+    blocks = add_blocks(builder, made, swaps)
     systems = theatre.systems | blocks
+    if organs is not None:
+        systems |= inside.add_organs(builder, scenario, theatre, organs)
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
+    if organs is not None and scenario.press.active:
+        systems |= inside.add_press(builder, scenario, organs)
     wires, exports = wiring(scenario, systems)
     return finish(builder, "gauze_delivery", systems, wires, exports, scenario.faults)

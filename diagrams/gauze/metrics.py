@@ -7,7 +7,9 @@ import numpy as np
 from diagrams.bedside.wrist_metrics import most, rms, wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
 from diagrams.gauze.foresight import Reach, unavoidable
+from diagrams.gauze.organs import organ_figures
 from diagrams.gauze.scenes import CONTACT
+from diagrams.gauze.sight import sight_figures
 from diagrams.gauze.tools import TARGET, gap, logged
 from plants.surgeon.recording import load_recording
 from systems.common.signal import vector
@@ -153,7 +155,8 @@ def measure(run: Any) -> dict[str, Any]:
         figures["recording_played"] = played
     if run.scenario.registration.active:
         figures["registration_error"] = registration_error(run)
-    figures |= bypass_figures(run, arrival, tip_error)
+    figures |= bypass_figures(run, arrival, tip_error) | organ_figures(run)
+    figures |= sight_figures(run)
     if run.scenario.emulated:
         figures |= wrist_figures(run, run.scenario.measure_from)
     return figures

@@ -19,6 +19,8 @@ from diagrams.gauze.tools import (
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
 from plants.instruments.instrument import InstrumentParams
+from plants.organs.organ_touch import OrganTouchParams
+from plants.organs.organs import Organ, surface_of
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
 from plants.surgeon.synthetic_hand import SyntheticHand
@@ -34,7 +36,9 @@ from systems.common.geometry import sub, unit
 from systems.common.parameter import parameter, part
 from systems.common.signal import vector
 from systems.common.signals import ViewCone
+from systems.motion.camera_planner import CameraPlannerParams
 from systems.motion.joint_commands import JointCommandsParams
+from systems.motion.tissue_press import TissuePressParams
 from systems.motion.tool_navigation import (
     ToolNavigationParams,
     cone_angle,
@@ -43,6 +47,7 @@ from systems.motion.tool_navigation import (
 )
 from systems.sensing.optical_tracker import OpticalTrackerParams
 from systems.sensing.registration import RegistrationParams
+from systems.sensing.tissue_force import TissueForceParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 BEHAVIOURS = ("bypass", "field")
@@ -62,8 +67,17 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     )
     robot: ToolAtStart = part(ToolAtStart)
     tools: list[Tool] = field(default_factory=usual_tools)
+    organs: list[Organ] = parameter([], "of the patient", shape=(-1,))
+    camera_planner: CameraPlannerParams = part(CameraPlannerParams)
+    judge_sight: bool = parameter(
+        False, "whether `tips_in_view` and `camera_path` are measured"
+    )
+    organ_touch: OrganTouchParams = part(OrganTouchParams)
+    tissue_force: TissueForceParams = part(TissueForceParams)
+    press: TissuePressParams = part(TissuePressParams)
     time_ratio: bool = parameter(
-        False, "whether it is run without O as well, for the figure `time_ratio`"
+        False,
+        "whether it is run without O, and organs, as well, for the figure `time_ratio`",
     )
     compare: bool = parameter(
         False, "whether the paper's planner is run as well and drawn beside it"
@@ -138,7 +152,7 @@ def companions(scenario: GauzeScenario) -> dict[str, GauzeScenario]:
         withdrawn(t) if isinstance(t, HandTool) and t.role == OBSTACLE else t
         for t in scenario.tools
     ]
-    return found | {WITHOUT_OBSTACLE: replace(alone, tools=tools)}
+    return found | {WITHOUT_OBSTACLE: replace(alone, tools=tools, organs=[])}
 
 
 def withdrawn(tool: HandTool) -> HandTool:
@@ -161,17 +175,35 @@ def check(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
     check_tools(scenario)
     check_wrist(scenario)
+    check_organs(scenario)
     check_fulcrums(scenario)
     _check_reach(scenario)
 
 
+def check_organs(scenario: GauzeScenario) -> None:
+    """Raises an error for organs that cannot be, or for a press that has none."""
+    for organ in scenario.organs:
+        if organ.file:
+            surface_of(organ)
+    if not scenario.press.active:
+        return
+    if not scenario.organs:
+        raise ScenarioError("press.active=True: expected organs to press on")
+    if not scenario.emulated:
+        raise ScenarioError(
+            f"wrist={scenario.wrist!r}: expected 'pwe' with press.active, whose force "
+            "loop needs the wrist's sensor"
+        )
+
+
 def check_tools(scenario: GauzeScenario) -> None:
     """Raises ScenarioError for tools that cannot be."""
-    names = [tool.name for tool in scenario.tools]
+    names = [one.name for one in (*scenario.tools, *scenario.organs)]
     for name in names:
         if names.count(name) > 1 or not name.isidentifier():
             raise ScenarioError(
-                f"tools={names}: expected names that differ, of letters, digits and _"
+                f"tools and organs {names}: expected names that differ, of letters, "
+                "digits and _"
             )
     for role in (TARGET, CAMERA):
         if len(scenario.of_role(role)) != 1:

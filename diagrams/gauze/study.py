@@ -9,8 +9,10 @@ from diagrams.bedside.wrist import wrist_signals
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
+from diagrams.gauze import film
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
+from diagrams.gauze.organs import organ_signals
 from diagrams.gauze.plots import plots
 from diagrams.gauze.scenario import GauzeScenario, check, companions
 from diagrams.gauze.tools import OBSTACLE, gather, hands, in_the_way, logged
@@ -32,6 +34,7 @@ from systems.common.signals import (
     ViewCone,
 )
 from systems.motion.joint_commands import Status
+from systems.motion.sight import Sight
 from systems.motion.tool_navigation import StopCode
 from systems.sensing.registration import Alignment
 
@@ -73,6 +76,9 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
     ports |= wrist_signals(scenario) if scenario.emulated else {}
     if scenario.registration.active:
         ports["tracker.alignment"] = Alignment
+    ports |= organ_signals(scenario)
+    if scenario.camera_planner.active:
+        ports["camera.sight"] = Sight
     if scenario.behaviour != "bypass":
         del ports["planner.way"]
     return ports
@@ -114,6 +120,8 @@ STUDY = Study(
     controller="tool_navigation",
     adjust=stiffen,
     companions=companions,
+    can_film=film.refuse_without_egl,
+    film=film.save_film,
     required=(
         "system",
         "duration",

@@ -23,7 +23,7 @@ from plants.tissue.snake_in_organ import SnakeInOrgan
 from plants.tissue.tissue_carver import Carving, TissueCarver
 from systems.keyhole.phases import OperationPhases
 from systems.keyhole.snake_load import SnakeLoad, weight_of
-from systems.keyhole.snake_task import SnakeTask
+from systems.keyhole.snake_task import FAR, SnakeTask
 from systems.keyhole.station_target import StationTarget
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask
@@ -55,6 +55,7 @@ KEYHOLE_WIRES = (
     ("wrench_watch.believed", "phases.wrench"),
     ("passive_wrist.permission", "phases.permission"),
     ("wire_watch.alarm", "phases.alarm"),
+    ("snake_task.deviation", "phases.deviation"),
     # The tube follows the organ, through the passive wrist.
     ("phases.phase", "tube_task.phase"),
     ("organ_estimator.motion", "tube_task.organ"),
@@ -72,7 +73,7 @@ KEYHOLE_WIRES = (
     *DRUM_WIRES,
     # What is true of it in the organ.
     ("snake_location.posture", "snake_in_organ.posture"),
-    ("plant.body_poses", "snake_in_organ.body_poses"),
+    ("wrist_sensor.mount", "snake_in_organ.mount"),
     ("organ_motion.y0", "snake_in_organ.entry"),
 )
 
@@ -89,6 +90,7 @@ EXPORTS = WRIST_EXPORTS | {
     "organ.true": "organ_motion.y0",
     "organ.estimate": "organ_estimator.motion",
     "tip.reference": "snake_task.reference",
+    "snake.deviation": "snake_task.deviation",
     "snake.tool": "snake_in_organ.tool",
     "snake.posture": "snake_location.bends",
     "snake.coupler_error": "snake_location.coupler_error",
@@ -143,13 +145,12 @@ def known_tube(scenario: KeyholeScenario) -> TubeParams:
     return replace(scenario.instrument, gauze_mass=mass)
 
 
-def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
+def make_blocks(case: KeyholeCase, posture: Any) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use.
 
     Args:
         case: The parameters and the plan.
         posture: Joint positions at the start (7) [rad].
-        tube: Place of the tube's body in the plant's `body_poses`.
     """
     s, o, snake = case.scenario, case.scenario.operation, case.scenario.in_tube
     task = SnakeTask(
@@ -161,6 +162,9 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
         s.tube_task.standoff,
     )
     start = task.inside
+    phases = s.phases
+    if case.resection is None:  # nothing is there that the body could touch
+        phases = replace(phases, deviation=FAR)
     gravity = (s.R_WE.T @ [0.0, 0.0, -9.81]).tolist()
     tube_known = known_tube(s)
     blocks = {
@@ -171,14 +175,16 @@ def make_blocks(case: KeyholeCase, posture: Any, tube: int) -> dict[str, Any]:
             RandomDistribution.kGaussian, 6, s.organ_tracker.period
         ),
         "organ_estimator": OrganEstimator(s.organ_estimator),
-        "phases": OperationPhases(s.phases),
+        "phases": OperationPhases(phases),
         "tube_task": TubeTask(s.tube_task, s.robot.p_WP, s.entry.p_WE, s.axis.tolist()),
         "snake_task": task,
-        "tube_location": TubeLocation(tube_known),
+        "tube_location": TubeLocation(
+            tube_known, posture.tolist(), s.arm, s.joints.period
+        ),
         "robot_location": RobotLocation(tube_known),
         "joint_commands": JointCommands(s.joints, posture.tolist(), s.arm, tube_known),
         "snake_in_organ": SnakeInOrgan(
-            snake, tube, s.instrument.length + s.instrument.gap, s.R_WE
+            snake, s.instrument.length + s.instrument.gap, s.R_WE
         ),
     }
     if case.resection is not None:
@@ -217,8 +223,7 @@ def make_keyhole_diagram(
 
     bedside = add_bedside(builder, s, hang)
     plant = bedside.systems["plant"]
-    tube = int(bedside.instrument.body.index())
-    own = make_blocks(case, bedside.posture, tube)
+    own = make_blocks(case, bedside.posture)
     if s.others:
         add_theatre(builder, s.surgeon, bedside)
         planner = gauze.make_blocks(s.surgeon, bedside.posture)

@@ -88,6 +88,7 @@ def measure(run: Any) -> dict[str, Any]:
         "max_fulcrum_error_3s": most(off[late]),
         "rms_organ_error": rms(organ[at_work]),
         "max_organ_error": most(organ[at_work]),
+        "max_body_deviation": most(run.snake.deviation.distance[at_work]),
         "max_coupler_error": float(run.snake.coupler_error.angle.max()),
         "gate_opened": gate[0] if gate else None,
         "withdrawal_time": max(drawn) if drawn else None,

@@ -11,7 +11,7 @@ from diagrams.common.progress import Progress
 from diagrams.keyhole.scenario import KeyholeScenario, circle_postures
 from diagrams.resection import operation
 from diagrams.resection.operation import Operation
-from systems.keyhole.snake_task import Plan, planned
+from systems.keyhole.snake_task import Plan, evenly, planned
 
 LOG_PERIOD = 1.0 / 30.0
 BEFORE = 30.0
@@ -47,7 +47,7 @@ def circle(scenario: KeyholeScenario) -> Plan:
         angles < ramp / 2.0, np.sqrt(2.0 * ramp * angles), angles + ramp / 2.0
     )
     x = np.array([np.interp(angles % turn, times, row) for row in postures.T]).T
-    return Plan(x, at, float(at[np.searchsorted(angles, turn - 1e-9)]))
+    return evenly(x, at, float(at[np.searchsorted(angles, turn - 1e-9)]))
 
 
 def case_of(scenario: KeyholeScenario, resection: Operation | None) -> KeyholeCase:

@@ -32,20 +32,11 @@ def course(run: Any) -> Figure:
         for one, end in zip(phases, ends, strict=True):
             axes.axvspan(one["start"], end, color=SHADES[one["phase"]], lw=0)
         axes.set_xlim(0.0, time[-1])
-    shown = -np.inf
-    for one, end in zip(phases, ends, strict=True):
-        if (
-            one["start"] - shown > 0.06 * time[-1]
-            or end - one["start"] > 0.1 * time[-1]
-        ):
-            shown = one["start"]
-            places[0].text(
-                shown,
-                1.02,
-                f" {one['phase']}",
-                transform=places[0].get_xaxis_transform(),
-                fontsize=8,
-            )
+    for shade in dict.fromkeys(one["phase"] for one in phases):
+        places[0].fill_between([], [], color=SHADES[shade], label=shade)
+    places[0].legend(
+        ncols=len(SHADES), loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=8
+    )
     force = np.linalg.norm(run.wall.force.f, axis=1)
     places[0].semilogy(time, np.maximum(force, 1e-3), color=COLORS["accent"], lw=0.7)
     places[0].set(ylabel="wall's force [N]", ylim=(2e-3, max(10.0, 2 * force.max())))

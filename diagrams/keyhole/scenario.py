@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, replace
 import math
+from typing import Any
 
 import numpy as np
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import WristSettings, check_wrist
+from diagrams.bedside.wrist import WristSettings
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
 from diagrams.gauze.tools import CameraTool
@@ -23,23 +24,35 @@ from plants.snake.reachability import why_not
 from plants.surgeon.recording import load_recording
 from plants.tissue.volume import Access
 from systems.bypass.obstacle_tools import Margins
+from systems.common.geometry import pose_of
 from systems.common.parameter import Rules, parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
-from systems.keyhole.snake_task import SnakeTaskParams
+from systems.keyhole.snake_task import SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.wrist_law import WristParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
 from systems.resection.wires.wire_drums import WireDrumsParams
 from systems.sensing.optical_tracker import MarkerBody, OpticalTrackerParams
 from systems.sensing.organ_estimator import OrganEstimatorParams
+from systems.sensing.tool_wrench import ToolWrenchParams
+from systems.sensing.wrench_watch import WrenchWatchParams
 
 TASKS = ("circle", "resect")
-PERIOD = 1.0 / 120.0
+PERIOD = 1.0 / 60.0
+"""Of all blocks, the tracker's."""
+CLOCKED = (
+    *("joints", "operation", "organ_estimator", "phases", "tube_task", "snake_task"),
+    *("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"),
+)
+"""Blocks that share their instants."""
 BASE = 2e-3
 """How far the snake's base may stand within the tube at work, in m."""
+BENT = (-0.015, 0.2, -0.3, 0.3, 0.2, 0.4, -0.1)
+"""A posture as plans have them, as far in as they go."""
 TURN = 120
 """Postures of a turn of the circle."""
 
@@ -86,7 +99,7 @@ class OrganOperation(ResectionScenario):
     )
     period: float = parameter(
         PERIOD,
-        "of drums and inverse kinematics, the wrist's",
+        "of drums and inverse kinematics, the joints'",
         "s",
         least=1e-3,
         most=0.1,
@@ -124,6 +137,7 @@ class SteadyFulcrum(FulcrumParams):
     steady: bool = parameter(
         True, "whether it is kept from drifting along the shaft, over minutes"
     )
+    period: float = parameter(PERIOD, "of the estimate", "s", above=0.0, most=0.1)
 
 
 @dataclass
@@ -161,6 +175,11 @@ class Entry:
     )
 
 
+def clocked(kind: Any, **more: Any) -> Any:
+    """A field that holds the parameters of a block on the common clock."""
+    return part(lambda: kind(period=PERIOD, **more))
+
+
 @dataclass
 class KeyholeScenario(Scenario, WristSettings):
     """One patient, one plant: tube and snake through the trocar of who breathes."""
@@ -175,13 +194,17 @@ class KeyholeScenario(Scenario, WristSettings):
     fulcrum_estimator: SteadyFulcrum = part(SteadyFulcrum)
     organ_motion: OrganMotionParams = part(OrganMotionParams)
     organ_tracker: OrganTracker = part(OrganTracker)
-    organ_estimator: OrganEstimatorParams = part(OrganEstimatorParams)
-    phases: PhasesParams = part(PhasesParams)
-    tube_task: TubeTaskParams = part(TubeTaskParams)
-    snake_task: SnakeTaskParams = part(SnakeTaskParams)
+    organ_estimator: OrganEstimatorParams = clocked(OrganEstimatorParams)
+    phases: PhasesParams = clocked(PhasesParams)
+    tube_task: TubeTaskParams = clocked(TubeTaskParams)
+    snake_task: SnakeTaskParams = clocked(SnakeTaskParams)
+    tool_wrench: ToolWrenchParams = clocked(ToolWrenchParams)
+    wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
+    # Half of an instrument's: the snake's couplers feel what the tube's end does.
+    passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
     circle: CircleParams = part(CircleParams)
     operation: OrganOperation = part(OrganOperation)
-    joints: JointCommandsParams = part(JointCommandsParams)
+    joints: JointCommandsParams = clocked(JointCommandsParams)
     arm: ArmParams = part(ArmParams)
     instrument: TubeParams = part(TubeParams)
     abdomen: AbdomenParams = part(AbdomenParams)
@@ -266,14 +289,18 @@ def circle_postures(scenario: KeyholeScenario) -> tuple[np.ndarray, np.ndarray]:
 
 def check(scenario: KeyholeScenario) -> None:
     """Raises ScenarioError for a scenario that cannot run."""
-    check_wrist(scenario)
     check_resection(scenario.operation)
-    if abs(scenario.operation.period - scenario.joints.period) > 1e-9:
-        raise ScenarioError(
-            f"operation.period={scenario.operation.period} s: expected joints.period="
-            f"{scenario.joints.period} s; arm and snake share their instants"
-        )
+    period = scenario.joints.period
+    for name in CLOCKED:
+        own = getattr(scenario, name).period
+        if abs(own - period) > 1e-9:
+            raise ScenarioError(
+                f"{name}.period={own} s: expected joints.period={period} s; arm, wrist "
+                "and snake share their instants"
+            )
     _check_reach(scenario)
+    if scenario.task == "resect":
+        _check_clearance(scenario)
     if scenario.task == "circle":
         circle_postures(scenario)
     if scenario.others:
@@ -309,6 +336,41 @@ def _check_reach(scenario: KeyholeScenario) -> None:
             f"instrument.length={length} m: the tube is too short, the mount would "
             f"meet the trocar; expected >= "
             f"{most + 0.02 + scenario.instrument.mount_length:.3f}"
+        )
+
+
+def tube_tilt(scenario: KeyholeScenario) -> float:
+    """Greatest angle of the tube at its station against z_E over a breath, in rad."""
+    wall, organ, z = scenario.wall_motion, scenario.organ_motion, scenario.axis
+    station = np.array(scenario.entry.p_WE) - scenario.tube_task.standoff * z
+    most = 0.0
+    for t in np.linspace(0.0, 1.0 / wall.rate, 49).tolist():
+        p_WG = np.add(scenario.robot.p_WG, wall.displacement(t))
+        u = station + organ.displacement(t, wall) - p_WG
+        most = max(most, math.acos(min(1.0, float(z @ u / np.linalg.norm(u)))))
+    return most
+
+
+def _check_clearance(scenario: KeyholeScenario) -> None:
+    """The plan must have room for what the tube's tilt does to the snake's body."""
+    o, angle, gap = scenario.operation, tube_tilt(scenario), scenario.instrument.gap
+    if scenario.phases.deviation > o.clearance:
+        raise ScenarioError(
+            f"phases.deviation={scenario.phases.deviation} m: expected <= "
+            f"operation.clearance={o.clearance} m, the room that the plan has"
+        )
+    c, s = math.cos(angle), math.sin(angle)
+    E = pose_of((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    C = pose_of((gap * s, 0.0, gap * (c - 1.0)), (c, 0.0, -s), (s, 0.0, c))
+    snake = o.snake
+    geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
+    away = body_deviation(np.array(BENT), C, E, *geometry)
+    if away > o.clearance:
+        raise ScenarioError(
+            f"operation.clearance={o.clearance} m: wall and organ tilt the tube by "
+            f"{math.degrees(angle):.1f} deg over a breath, which bends the snake's "
+            f"body off its plan by {away:.2g} m; expected at least that, or motions "
+            "more in phase"
         )
 
 

@@ -20,7 +20,7 @@ from plants.snake.signals import ToolPose
 from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
 from systems.common.signal import Many
 from systems.common.signals import Force, MovingPoint, RobotTool, Shaft
-from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
+from systems.keyhole.signals import BodyDeviation, Phase, SnakeStatus, TubeStatus
 from systems.motion.joint_commands import Status
 from systems.motion.tool_navigation import StopCode
 from systems.resection.wires.resection_ik import IkStatus
@@ -40,6 +40,7 @@ SIGNALS = WRIST_SIGNALS | {
     "organ.true": MovingPoint,
     "organ.estimate": OrganMotion,
     "tip.reference": ToolPose,
+    "snake.deviation": BodyDeviation,
     "snake.tool": ToolPose,
     "snake.posture": Bends,
     "snake.coupler_error": CouplerError,

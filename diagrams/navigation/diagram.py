@@ -9,12 +9,23 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, RandomSource
 
 from diagrams.common.wiring import add_blocks, finish
-from diagrams.navigation.scenario import NavigationScenario, discs, heading
+from diagrams.navigation.scenario import (
+    NavigationScenario,
+    discs,
+    heading,
+    mapping_params,
+    walking,
+)
 from plants.crowd.crowd_motion import CrowdMotion
 from plants.crowd.obstacle_motion import ObstacleMotion
+from plants.crowd.walls import segments
 from plants.turtlebot.arena import add_arena
+from plants.turtlebot.lidar import SCAN_NOISE, Lidar
+from plants.turtlebot.odometry import Odometry, OdometryNoise
 from plants.turtlebot.turtlebot import make_turtlebot
 from systems.common.signal import size
+from systems.perception.grid_mapping import GridMapping
+from systems.perception.tracking import Tracking
 from systems.switching.classical_planner import ClassicalPlanner
 from systems.switching.navigation_planner import PERIOD
 from systems.switching.perception import Perception
@@ -23,17 +34,43 @@ from systems.switching.statechart_planner import StatechartPlanner
 from systems.switching.switching_planner import SwitchingPlanner
 from systems.switching.unicycle_control import UnicycleControl
 
-WIRES = (
-    # Perception: the obstacles within the disc of vision.
+PERSON = 0.3
+"""Radius [m] that whoever is seen by the legs is given."""
+GIVEN = (
+    # Perception: the obstacles within the disc of vision, and the true place.
     ("robot.y0", "perception.robot"),
     ("obstacles.obstacles", "perception.obstacles"),
     ("noise.output", "perception.noise"),
-    # Planning: one potential, one velocity.
-    ("robot.y0", "planner.robot"),
     ("perception.seen", "planner.seen"),
+    ("robot.y0", "planner.robot"),
+    ("robot.y0", "control.robot"),
+)
+"""Perception that is told the truth, with noise at most."""
+SENSED = (
+    # The senses.
+    ("robot.y0", "lidar.robot"),
+    ("obstacles.obstacles", "lidar.obstacles"),
+    ("lidar_noise.output", "lidar.noise"),
+    ("robot.y0", "odometry.robot"),
+    ("odometry_noise.output", "odometry.noise"),
+    # Place and grid.
+    ("odometry.reckoned", "mapping.reckoned"),
+    ("lidar.scan", "mapping.scan"),
+    ("tracking.moving", "mapping.moving"),
+    # What moves, and what stands.
+    ("mapping.place", "tracking.place"),
+    ("lidar.scan", "tracking.scan"),
+    ("mapping.grid", "tracking.grid"),
+    ("tracking.seen", "planner.seen"),
+    ("tracking.corners", "planner.corners"),
+    ("mapping.place", "planner.robot"),
+    ("mapping.place", "control.robot"),
+)
+"""Perception by lidar and odometry."""
+WIRES = (
+    # Planning: one potential, one velocity.
     ("goal.y0", "planner.goal"),
     # Action: the velocity becomes speed and turn rate.
-    ("robot.y0", "control.robot"),
     ("planner.v_R", "control.v_R"),
     ("planner.mode", "control.mode"),
     ("control.command", "robot.u0"),
@@ -41,7 +78,7 @@ WIRES = (
     ("robot.y0", "arena.robot"),
     ("obstacles.obstacles", "arena.obstacles"),
 )
-"""Every signal of the diagram."""
+"""Every other signal of the diagram."""
 
 EXPORTS = {
     "robot.state": "robot.y0",
@@ -52,6 +89,13 @@ EXPORTS = {
     "scene_graph.query": "scene_graph.query",
 }
 """What can be logged, and drawn."""
+SENSED_EXPORTS = {
+    "lidar.scan": "lidar.scan",
+    "mapping.place": "mapping.place",
+    "mapping.sureness": "mapping.sureness",
+    "tracking.moving": "tracking.moving",
+}
+"""What else, where the robot sees for itself."""
 
 
 def make_planner(scenario: NavigationScenario) -> Any:
@@ -68,6 +112,7 @@ def make_planner(scenario: NavigationScenario) -> Any:
         body_radius=radius,
         speed=speed,
         vision=scenario.perception.vision,
+        braking=scenario.robot.acceleration,
         # What stands must not seem to move by the noise of its measured velocity.
         standing_speed=max(
             scenario.switching.standing_speed, 3.0 * scenario.perception.velocity_noise
@@ -76,13 +121,40 @@ def make_planner(scenario: NavigationScenario) -> Any:
     return SwitchingPlanner(switching)
 
 
+def gaussian(signal: Any) -> Any:
+    """A source of the standard normal numbers of a signal."""
+    return RandomSource(RandomDistribution.kGaussian, size(signal), PERIOD)
+
+
+def given_blocks(scenario: NavigationScenario) -> dict[str, Any]:
+    """Perception that is told the truth."""
+    return {"noise": gaussian(NOISE), "perception": Perception(scenario.perception)}
+
+
+def sense_blocks(scenario: NavigationScenario) -> dict[str, Any]:
+    """Senses, and the perception that makes something of them."""
+    s = scenario
+    mapping = mapping_params(s)
+    tracking = replace(s.tracking, vision=s.perception.vision)
+    if s.lidar.legs:
+        tracking = replace(tracking, person=s.tracking.person or PERSON)
+    return {
+        "lidar_noise": gaussian(SCAN_NOISE),
+        "lidar": Lidar(s.lidar, segments(s.walls)),
+        "odometry_noise": gaussian(OdometryNoise),
+        "odometry": Odometry(s.odometry),
+        "mapping": GridMapping(mapping),
+        "tracking": Tracking(tracking, mapping),
+    }
+
+
 def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that `WIRES` uses."""
     s = scenario
     if s.crowd.people:
-        obstacles: Any = CrowdMotion(s.crowd)
+        obstacles: Any = CrowdMotion(s.crowd, s.robot.radius)
     else:
-        obstacles = ObstacleMotion(s.obstacles)
+        obstacles = ObstacleMotion(walking(s))
     control = replace(
         s.control,
         speed=s.robot.speed,
@@ -92,8 +164,7 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     return {
         "robot": make_turtlebot(s.robot, [*s.start, heading(s)]),
         "obstacles": obstacles,
-        "noise": RandomSource(RandomDistribution.kGaussian, size(NOISE), PERIOD),
-        "perception": Perception(s.perception),
+        **(sense_blocks(s) if s.senses == "lidar" else given_blocks(s)),
         "goal": ConstantVectorSource(s.goal),
         "planner": make_planner(s),
         "control": UnicycleControl(control),
@@ -103,6 +174,7 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
 def floor(scenario: NavigationScenario) -> list[float]:
     """Least x, least y, greatest x, greatest y [m] of what is worth seeing."""
     points = [scenario.start, scenario.goal]
+    points += [point for wall in scenario.walls for point in wall.points]
     points += [[o.x, o.y] for o in discs(scenario)]
     xs, ys = zip(*points, strict=True)
     return [min(xs) - 1.5, min(ys) - 1.5, max(xs) + 1.5, max(ys) + 1.5]
@@ -132,7 +204,13 @@ def make_navigation_diagram(
         vision=scenario.perception.vision,
         goal=scenario.goal,
         floor=floor(scenario),
+        walls=scenario.walls,
     )
     blocks = add_blocks(builder, make_blocks(scenario), swaps)
     systems = {"scene_graph": scene_graph, "arena": arena} | blocks
-    return finish(builder, "navigation", systems, WIRES, EXPORTS, scenario.faults)
+    sensed = scenario.senses == "lidar"
+    wires = [*(SENSED if sensed else GIVEN), *WIRES]
+    if scenario.crowd.people:
+        wires.append(("robot.y0", "obstacles.robot"))
+    exports = EXPORTS | (SENSED_EXPORTS if sensed else {})
+    return finish(builder, "navigation", systems, wires, exports, scenario.faults)

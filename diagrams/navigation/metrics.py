@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.navigation.perceived import measure_perception
 from diagrams.navigation.scenario import outruns
+from plants.crowd.walls import wall_distance
 
 
 def gaps(run: Any) -> np.ndarray:
@@ -32,13 +34,17 @@ def measure(run: Any) -> dict[str, Any]:
     near = np.flatnonzero(goal_distance(run) <= run.scenario.reach)
     last = int(near[0]) if near.size else len(time) - 1
     clearance = float(gaps(run)[: last + 1].min())
+    if run.scenario.walls:
+        places = np.column_stack([robot.x, robot.y])[: last + 1]
+        to_walls = wall_distance(run.scenario.walls, places)
+        clearance = min(clearance, float(to_walls.min()) - run.scenario.robot.radius)
     steps = np.hypot(np.diff(robot.x[: last + 1]), np.diff(robot.y[: last + 1]))
     straight = float(goal_distance(run)[0])
     mode = run.planner.mode
     switches = np.diff(np.round(mode.state[: last + 1]))
     outrun = np.round(mode.outrun[: last + 1])
     collided = clearance <= 0.0
-    return {
+    figures = {
         "reached": bool(near.size) and not collided,
         "collided": collided,
         "time_to_target": float(time[last]) if near.size else None,
@@ -48,3 +54,6 @@ def measure(run: Any) -> dict[str, Any]:
         "outrun_time": float(outrun.mean() * time[last]),
         "faster_obstacles": outruns(run.scenario),
     }
+    if run.scenario.senses == "lidar":
+        figures |= measure_perception(run)
+    return figures

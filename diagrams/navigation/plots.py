@@ -14,6 +14,7 @@ from diagrams.navigation.figures import (
     total_potential,
 )
 from diagrams.navigation.metrics import gaps, goal_distance
+from diagrams.navigation.perceived import perception
 from diagrams.navigation.scenario import discs
 from systems.switching.classical_planner import ClassicalParams
 from systems.switching.signals import Seen
@@ -57,6 +58,8 @@ def draw_world(axes: Any, run: Any, moments: int = 5) -> None:
             axes.add_patch(disc)
         if moves:
             axes.plot(*track.T, ":", color=COLORS["obstacle"], lw=0.8)
+    for wall in run.scenario.walls:
+        axes.plot(*np.transpose(wall.points), color="k", lw=2.0)
     axes.plot(*run.scenario.start, "o", color="k", ms=5)
     axes.plot(*run.scenario.goal, "*", color=COLORS["target"], ms=13, zorder=5)
     axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
@@ -161,6 +164,8 @@ def plots(run: Any) -> dict[str, Figure]:
     """All plots of a run, by file name."""
     runs = {run.scenario.planner: run, **run.case.companions}
     figures = {"path": path(run, runs), "motion": motion(run)}
+    if run.scenario.senses == "lidar":
+        figures["perception"] = perception(run)
     if run.scenario.thesis_figures:
         figures["potential"] = potential(run, runs)
         params, world = classical_world(run.scenario)

@@ -11,10 +11,13 @@ from diagrams.common.replay import draw_trail
 from diagrams.common.study import Study, View
 from diagrams.navigation.diagram import floor, make_navigation_diagram
 from diagrams.navigation.metrics import measure
+from diagrams.navigation.perceived import decorate_perception
 from diagrams.navigation.plots import plots, state_names
 from diagrams.navigation.scenario import NavigationScenario, check, companions
 from plants.crowd.signals import OBSTACLES
+from plants.turtlebot.lidar import SCAN
 from plants.turtlebot.turtlebot import Command, RobotState
+from systems.perception.signals import MOVING, Sureness
 from systems.switching.signals import Mode, PlanarVelocity
 
 SIGNALS = {
@@ -24,6 +27,13 @@ SIGNALS = {
     "planner.mode": Mode,
     "control.command": Command,
 }
+SENSED = {
+    "lidar.scan": SCAN,
+    "mapping.place": RobotState,
+    "mapping.sureness": Sureness,
+    "tracking.moving": MOVING,
+}
+"""What is logged beside, where the robot sees for itself."""
 LAMPS = (
     (0.20, 0.66, 0.36, 1.0),  # attractive
     (0.95, 0.75, 0.15, 1.0),  # bypass
@@ -54,6 +64,8 @@ def light(meshcat: Any, floor: list[float]) -> None:
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     """The robot's trail, and a lamp above it in the colour of the state."""
     light(meshcat, floor(run.scenario))
+    if run.scenario.senses == "lidar":
+        decorate_perception(meshcat, animation, run)
     time = run.signals["time"]
     robot = run.robot.state
     trail = np.column_stack([robot.x, robot.y, np.full(len(time), 0.02)])
@@ -77,7 +89,7 @@ STUDY = Study(
     make_diagram=lambda case: make_navigation_diagram(case.scenario),
     check=check,
     measure=measure,
-    signals=lambda scenario: SIGNALS,
+    signals=lambda scenario: SIGNALS | (SENSED if scenario.senses == "lidar" else {}),
     log_period=0.05,
     plots=plots,
     decorate=decorate,

@@ -15,6 +15,7 @@ most of it dry. Lateral trocar stiffness was not found in vivo: sweep 100 to 300
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
+from math import asin, atan2, cos, sin
 from typing import Any
 
 from pydrake.geometry import Cylinder
@@ -30,8 +31,12 @@ from pydrake.multibody.tree import (
 
 from plants.abdomen.skin import draw_skin
 from plants.common.looks import TROCAR, draw
+from systems.common.compiled import compiled
+from systems.common.geometry import Pose, Vector, along, cross, scaled
 from systems.common.parameter import check, parameter
 
+TURNING_DAMPING = 0.02
+"""Of a trocar's resistance to tilting, for its stiffness, in s."""
 _SEAL_VISCOSITY = 1e4
 """Slope of the seal's friction about zero speed, in N s/m: full friction is reached
 at 0.1 mm/s per newton."""
@@ -160,8 +165,7 @@ def add_abdomen(
             fulcrum,
             sleeve.body_frame(),
             [params.turning_stiffness, params.turning_stiffness, 0.0],
-            # Half a second to come to rest is what silicone does.
-            [0.02 * params.turning_stiffness] * 2 + [0.0],
+            [TURNING_DAMPING * params.turning_stiffness] * 2 + [0.0],
             [params.stiffness] * 3,
             [params.damping] * 3,
         )
@@ -169,6 +173,54 @@ def add_abdomen(
     for instance in (wall_instance, sleeve_instance):
         plant.set_gravity_enabled(instance, False)
     return Abdomen(wall_instance, sleeve_instance, wall, sleeve, joint, bushing, params)
+
+
+@compiled
+def spring_on_sleeve(
+    p: Vector, v: Vector, w: Vector, stiffness: float, damping: float
+) -> tuple[Vector, Vector]:
+    """What the bushing does to the sleeve, in W: torque about its origin, and force.
+
+    Drake's bushing acts half-way between its two frames, and its damper does not count
+    half of the frames' turning against each other.
+
+    Args:
+        p: From the fulcrum to the sleeve, in m.
+        v: Velocity of the sleeve relative to the fulcrum, in m/s.
+        w: Angular velocity of the sleeve; the wall does not turn.
+        stiffness: K in N/m.
+        damping: D in N s/m.
+    """
+    seen = along(v, -0.5, cross(w, p))
+    force = along(scaled(-stiffness, p), -damping, seen)
+    return scaled(-0.5, cross(p, force)), force
+
+
+@compiled
+def torque_on_sleeve(C: Pose, w: Vector, stiffness: float, damping: float) -> Vector:
+    """What the bushing's resistance to tilting adds to that torque, in W.
+
+    Drake's is a torque on the roll and pitch angles of the sleeve against the fulcrum,
+    whose z axis points into the body.
+
+    Args:
+        C: The sleeve's pose.
+        w: Its angular velocity.
+        stiffness: In N m/rad.
+        damping: In N m s/rad.
+    """
+    if stiffness == 0.0:
+        return 0.0, 0.0, 0.0
+    # In the fulcrum's frame, turned half about x.
+    x, z = (C.x[0], -C.x[1], -C.x[2]), (C.z[0], -C.z[1], -C.z[2])
+    y = cross(z, x)
+    pitch, roll, yaw = asin(-x[2]), atan2(y[2], z[2]), atan2(x[1], x[0])
+    c, s, cp = cos(yaw), sin(yaw), cos(pitch)
+    rolling = (c * w[0] - s * w[1]) / cp
+    pitching = -s * w[0] - c * w[1]
+    t_r = -(stiffness * roll + damping * rolling) / cp
+    t_p = -(stiffness * pitch + damping * pitching)
+    return c * t_r - s * t_p, -(s * t_r + c * t_p), 0.0
 
 
 def seat_sleeve(plant: Any, context: Any, abdomen: Abdomen) -> None:

@@ -12,12 +12,13 @@ FLOOR = -0.85
 """Height of the floor in the world, in m."""
 
 
-def add_scenery(plant: Any, p_WB: Sequence[float]) -> None:
+def add_scenery(plant: Any, p_WB: Sequence[float], organs: bool = True) -> None:
     """Draws a draped table, tissue, liver and a stand under the arm.
 
     Args:
         plant: A MultibodyPlant that is not yet finalized, with a SceneGraph.
         p_WB: Position of the arm's base in the world, in m (3).
+        organs: Whether liver and gallbladder are drawn; false if there are real ones.
     """
     body = plant.world_body()
     for name, shape, p, yaw, rgba in (
@@ -27,6 +28,8 @@ def add_scenery(plant: Any, p_WB: Sequence[float]) -> None:
         ("liver", Ellipsoid(0.075, 0.11, 0.034), [0.05, 0.12, -0.208], 0.4, LIVER),
         ("gall", Ellipsoid(0.030, 0.015, 0.014), [0.02, 0.015, -0.200], 0.9, GALL),
     ):
+        if name in ("liver", "gall") and not organs:
+            continue
         draw(
             plant,
             body,

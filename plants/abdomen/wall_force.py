@@ -7,25 +7,20 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialVelocity
 
 from plants.abdomen.abdomen import Abdomen
-from systems.common.block import Block
-from systems.common.compiled import Numbers, compiled
+from plants.common.tree import move_tree, pose_in, read_tree
+from systems.common.compiled import Numbers, compiled, packed
 from systems.common.geometry import across, along, norm, scaled, sub, xyz
-from systems.common.signal import Field, Vector, writer
+from systems.common.signal import Field, Vector
 from systems.common.signals import Force, MovingPoint
+from systems.common.step_block import StepBlock, wired
 
 
 class FulcrumError(NamedTuple):
     """How far the shaft passes the true fulcrum."""
 
     distance: Annotated[float, Field("m", "of its line from the fulcrum", 1e-3)]
-
-
-write_force = writer(Force)
 
 
 @compiled
@@ -50,15 +45,25 @@ def lateral_force(
 
 
 @compiled
-def _lever(p_WI: Numbers, p_WC: Numbers, R_WC: np.ndarray) -> tuple[Vector, Vector]:
-    return sub(p_WI, p_WC), xyz(R_WC[:, 2], 0)
+def _truth(
+    c: Any, tree: Any, state: np.ndarray, stiffness: np.ndarray
+) -> tuple[Force, FulcrumError, MovingPoint]:
+    n, bodies = len(state) // 2, len(tree.parent)
+    X, V = np.zeros((bodies, 12)), np.zeros((bodies, 6))
+    move_tree(tree, state[:n], state[n:], X, V)
+    wall, sleeve = pose_in(X, c.wall), pose_in(X, c.sleeve)
+    v_WI = xyz(V[c.wall], 3)
+    v = sub(v_WI, xyz(V[c.sleeve], 3))
+    force, away = lateral_force(
+        sub(wall.p, sleeve.p), sleeve.z, v, stiffness[0], c.damping
+    )
+    return Force(force), FulcrumError(away), MovingPoint(wall.p, v_WI)
 
 
-class WallForce(Block):
-    """Reads the wall's force and the fulcrum's error from the plant's bodies.
+class WallForce(StepBlock):
+    """Reads the wall's force and the fulcrum's error from the plant's state.
 
-    Port ``body_poses`` accepts the plant's `body_poses`, port
-    ``body_spatial_velocities`` the plant's output of that name.
+    Port ``state`` accepts the plant's state.
     Port ``force`` emits the true `Force` of the wall on the shaft, across the shaft.
     The sleeve's own inertia and the bushing's turning rate are left out (20 g, and D
     times millimetres per second).
@@ -67,59 +72,40 @@ class WallForce(Block):
     """
 
     def __init__(
-        self, abdomen: Abdomen, factor: Callable[[float], float] = lambda time: 1.0
+        self,
+        plant: Any,
+        abdomen: Abdomen,
+        factor: Callable[[float], float] = lambda time: 1.0,
     ) -> None:
         """Makes the block.
 
         Args:
+            plant: The finalized plant.
             abdomen: What `add_abdomen` returned.
             factor: The trocar's stiffness against the abdomen's, by time in s.
         """
         super().__init__()
-        self._factor = factor
-        self._wall = int(abdomen.wall.index())
-        self._sleeve = int(abdomen.sleeve.index())
-        self._stiffness = float(abdomen.params.stiffness)
-        self._damping = float(abdomen.params.damping)
-        self._poses = self.DeclareAbstractInputPort(
-            "body_poses", Value([RigidTransform()])
+        self._factor, self._stiffness = factor, abdomen.params.stiffness
+        self._constants = packed(
+            wall=int(abdomen.wall.index()),
+            sleeve=int(abdomen.sleeve.index()),
+            damping=float(abdomen.params.damping),
         )
-        self._velocities = self.DeclareAbstractInputPort(
-            "body_spatial_velocities", Value([SpatialVelocity()])
+        self._tree = read_tree(plant)
+        start = plant.GetPositionsAndVelocities(plant.CreateDefaultContext())
+        gives = [Force, FulcrumError, MovingPoint]
+        self._read = wired(_truth, 2, [], [len(start), 1], gives, False)
+        self._state = self.vector_in("state", start.tolist())
+        truth = self.cached(
+            "truth", self._calc_truth, {self._state.ticket(), self.time_ticket()}
         )
-        standing = {self._poses.ticket()}
-        moving = standing | {self._velocities.ticket()}
-        self._lever = self.cached("lever", self._calc_lever, standing)
-        self.signal_out("force", Force, self._calc_force, moving | {self.time_ticket()})
-        self.signal_out("fulcrum_error", FulcrumError, self._calc_error, standing)
-        self.signal_out("fulcrum", MovingPoint, self._calc_fulcrum, moving)
+        outputs = dict(zip(("force", "fulcrum_error", "fulcrum"), gives, strict=True))
+        self._emit(truth, outputs, 0)
 
-    def _calc_lever(self, context: Any) -> tuple[Vector, Vector]:
-        """From the sleeve to the fulcrum, and the shaft's axis, in W."""
-        poses = self._poses.Eval(context)
-        wall, sleeve = poses[self._wall], poses[self._sleeve]
-        return _lever(
-            wall.translation(), sleeve.translation(), sleeve.rotation().matrix()
-        )
-
-    def _calc_force(self, context: Any) -> np.ndarray:
-        velocities = self._velocities.Eval(context)
-        wall, sleeve = velocities[self._wall], velocities[self._sleeve]
-        v = wall.translational() - sleeve.translational()
-        p, u = self._lever.Eval(context)
-        stiffness = self._stiffness * self._factor(context.get_time())
-        force, _ = lateral_force(p, u, v, stiffness, self._damping)
-        return write_force(Force(force))
-
-    def _calc_error(self, context: Any) -> list[float]:
-        p, u = self._lever.Eval(context)
-        _, error = lateral_force(p, u, np.zeros(3), 0.0, 0.0)
-        return [error]
-
-    def _calc_fulcrum(self, context: Any) -> np.ndarray:
-        p_WI = self._poses.Eval(context)[self._wall].translation()
-        v_WI = self._velocities.Eval(context)[self._wall].translational()
-        return np.concatenate([p_WI, v_WI])
+    def _calc_truth(self, context: Any) -> np.ndarray:
+        stiffness = np.array([self._stiffness * self._factor(context.get_time())])
+        state = self._state.Eval(context)
+        return self._read(self._constants, self._tree, state, stiffness)
 
 
 def add_wall_force(
@@ -129,7 +115,6 @@ def add_wall_force(
     factor: Callable[[float], float] = lambda time: 1.0,
 ) -> WallForce:
     """Adds the block as `wall_force` and wires it to the plant."""
-    block = builder.AddNamedSystem("wall_force", WallForce(abdomen, factor))
-    for name in ("body_poses", "body_spatial_velocities"):
-        builder.Connect(plant.GetOutputPort(name), block.GetInputPort(name))
+    block = builder.AddNamedSystem("wall_force", WallForce(plant, abdomen, factor))
+    builder.Connect(plant.get_state_output_port(), block.GetInputPort("state"))
     return block

@@ -146,3 +146,33 @@ class SetPoint:
         if tau is not None:
             sent[:JOINTS] += self.compliance * tau
         return sent
+
+
+def servo_step(
+    plant: Any, posture: Any, params: ArmParams | None, period: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """What is left of a lag after a period for which a `SetPoint` is held.
+
+    Joints that lag e = q - q_d behind a command that goes on by d will lag
+
+        A e + C (v period - d),   B = M / period + kd + b + kp period,
+        C = B^-1 M / period,      A = 1 - period B^-1 kp,
+
+    at its end: the implicit step that CENIC takes from one set-point to the next.
+
+    Args:
+        plant: A controller's plant.
+        posture: At which the mass matrix is taken, in rad (7).
+        params: Servo gains.
+        period: In s.
+
+    Returns:
+        A and C, (7, 7).
+    """
+    params, context = params or ArmParams(), plant.CreateDefaultContext()
+    plant.SetPositions(context, np.array(posture, float))
+    inertia, kp = plant.CalcMassMatrix(context) / period, np.diag(params.kp)
+    damping = np.diag(np.array(params.kd) + FRICTION) + period * kp
+    C = np.linalg.solve(inertia + damping, inertia)
+    A = np.eye(JOINTS) - period * np.linalg.solve(inertia + damping, kp)
+    return A, C

@@ -1,7 +1,7 @@
-"""A crowd that crosses a circle, everyone avoiding everyone but the robot.
+"""A crowd that crosses a circle, everyone avoiding everyone, the robot if they see it.
 
-The circle crossing of the CrowdNav benchmark (C. Chen et al., ICRA 2019): humans
-start on a circle, walk to the opposite point by ORCA, and do not see the robot.
+The circle crossing of the CrowdNav benchmark (C. Chen et al., ICRA 2019): humans start
+on a circle and walk to the opposite point, by ORCA there, and do not see the robot.
 """
 
 from collections.abc import Sequence
@@ -14,10 +14,13 @@ import numpy as np
 
 from plants.crowd.orca import orca_towards
 from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle, filled
+from plants.crowd.social_force import social_force_towards
+from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import size
 
+MODELS = ("orca", "social_force")
 PERIOD = 0.25
 """Of everyone's decisions [s]."""
 
@@ -34,6 +37,8 @@ class CrowdParams:
     )
     x: float = parameter(0.0, "of the circle's centre", "m", least=-100.0, most=100.0)
     y: float = parameter(0.0, "of the circle's centre", "m", least=-100.0, most=100.0)
+    model: str = parameter("orca", "by what they avoid each other", choices=MODELS)
+    sees_robot: bool = parameter(False, "whether they avoid the robot as well")
     seed: int = parameter(1, "of the starts", least=0, most=2**31 - 1)
 
     def rules(self) -> Rules:
@@ -71,13 +76,20 @@ def starts(params: CrowdParams) -> list[Obstacle]:
 
 
 class CrowdMotion(Block):
-    """Moves a crowd by ORCA; the robot is invisible to it.
+    """Moves a crowd by ORCA or the social force.
 
+    Port ``robot`` accepts the `RobotState`; it need not be connected.
     Port ``obstacles`` emits everyone, rows of `Obstacle`.
     """
 
-    def __init__(self, params: CrowdParams | None = None) -> None:
+    def __init__(
+        self, params: CrowdParams | None = None, robot_radius: float = 0.18
+    ) -> None:
         """Makes the block.
+
+        Args:
+            params: Parameters.
+            robot_radius: Of whom they may see [m].
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -89,6 +101,8 @@ class CrowdMotion(Block):
         people = starts(self.params)
         x, y = 2.0 * self.params.x, 2.0 * self.params.y
         self.goals = [(x - o.x, y - o.y) for o in people]
+        self._radius = robot_radius
+        self._robot = self.signal_in("robot", RobotState)
         self._decided = self.DeclareDiscreteState([0.0])
         self._people = self.DeclareDiscreteState(np.ravel(people))
         self.signal_out(
@@ -111,7 +125,21 @@ class CrowdMotion(Block):
 
     def _update(self, context: Any) -> Sequence[Any]:
         people = self._now(context)
-        moves = orca_towards(people, self.goals, self.params.speed, 5.0, PERIOD)
+        seen = []
+        if self.params.sees_robot and self._robot.HasValue(context):
+            robot = RobotState(*self._robot.Eval(context).tolist())
+            c, s = cos(robot.theta), sin(robot.theta)
+            here = (robot.x, robot.y, self._radius, robot.v * c, robot.v * s)
+            seen = [Obstacle(*here)]
+        if self.params.model == "orca":
+            goals = [*self.goals, *((o.x + o.v_x, o.y + o.v_y) for o in seen)]
+            agents = [*people, *seen]
+            moves = orca_towards(agents, goals, self.params.speed, 5.0, PERIOD)
+            moves = moves[: len(people)]
+        else:
+            moves = social_force_towards(
+                [*people, *seen], self.goals, self.params.speed, PERIOD
+            )
         turned = [
             person._replace(v_x=v_x, v_y=v_y)
             for person, (v_x, v_y) in zip(people, moves, strict=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from systems.common.signal import Field, Many, size
 
-CAPACITY = 24
+CAPACITY = 40
 """Number of obstacles that the signals have room for."""
 
 ROWS = tuple(map(str, range(CAPACITY)))

@@ -24,6 +24,9 @@ from pydrake.multibody.tree import (
 from plants.common.looks import DARK, GAUZE, STEEL, draw
 from systems.common.parameter import check, parameter
 
+GAUZE_RADIUS = 0.0045
+"""Of the gauze in the jaw, m."""
+
 
 @dataclass
 class InstrumentParams:
@@ -179,4 +182,11 @@ def _draw(plant: Any, body: Any, params: InstrumentParams) -> None:
         STEEL,
     )
     draw(plant, body, Capsule(0.6 * radius, 0.012), along(length - 0.006), "jaw", DARK)
-    draw(plant, body, Ellipsoid(0.0045, 0.0040, 0.0040), along(length), "gauze", GAUZE)
+    draw(
+        plant,
+        body,
+        Ellipsoid(GAUZE_RADIUS, 0.004, 0.004),
+        along(length),
+        "gauze",
+        GAUZE,
+    )

@@ -19,11 +19,27 @@ from pydrake.common.value import Value
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from plants.abdomen.abdomen import Abdomen
-from systems.common.block import Block
-from systems.common.compiled import compiled
-from systems.common.geometry import cross, plus, sub, xyz
-from systems.common.signal import Field, Vector, size
+from plants.abdomen.abdomen import (
+    TURNING_DAMPING,
+    Abdomen,
+    spring_on_sleeve,
+    torque_on_sleeve,
+)
+from plants.common.tree import mass_centre, momentum, move_tree, pose_in, read_tree
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import (
+    Pose,
+    along,
+    cross,
+    inwards,
+    over,
+    plus,
+    scaled,
+    sub,
+    xyz,
+)
+from systems.common.signal import Field, Vector, flat, size
+from systems.common.step_block import StepBlock, wired
 
 _STILL = (0.0, 0.0, 0.0)
 
@@ -38,47 +54,126 @@ class Felt(NamedTuple):
     a_C: Annotated[Vector, Field("m/s^2", "of the sleeve's", _STILL)]
 
 
-_MOVING = 6 + 6 + 3  # momentum, V_WM, v_WC
-_FELT = size(Felt)
+class Mount(NamedTuple):
+    """The frame M of what the weld carries, and how it moves."""
+
+    p: Annotated[Vector, Field("m", "p_WM", (0.0, 0.0, 0.3))]
+    x: Annotated[Vector, Field("1", "x axis", (1.0, 0.0, 0.0))]
+    y: Annotated[Vector, Field("1", "y axis", (0.0, -1.0, 0.0))]
+    z: Annotated[Vector, Field("1", "z axis, along the shaft", (0.0, 0.0, -1.0))]
+    w: Annotated[Vector, Field("rad/s", "w_WM", _STILL)]
+    v: Annotated[Vector, Field("m/s", "v_WM", _STILL)]
+    p_C: Annotated[Vector, Field("m", "p_WC of the sleeve", _STILL)]
+
+
+class Moving(NamedTuple):
+    """What the sensor compares with the instant before: all in W."""
+
+    turning: Vector  # angular momentum about the world's origin
+    pushing: Vector  # momentum
+    w: Vector  # w_WM
+    v: Vector  # v_WM
+    v_C: Vector  # of the sleeve
+    time: float  # of the last reading; negative before the first
+    f: Vector  # that reading, as `Felt`
+    m: Vector
+    alpha: Vector
+    a: Vector
+    a_C: Vector
+
+
+class Load(NamedTuple):
+    """What else acts on all below: moment about the world's origin, and force."""
+
+    m: Vector
+    f: Vector
+
+
+_START = Moving(
+    _STILL, _STILL, _STILL, _STILL, _STILL, -1.0, _STILL, _STILL, _STILL, _STILL, _STILL
+)
+
+
+@compiled
+def _sense(
+    c: Any,
+    tree: Any,
+    old: Moving,
+    time: float,
+    state: np.ndarray,
+    stiffness: np.ndarray,
+    load: Load,
+) -> tuple[Moving, Mount]:
+    """The state with this instant's reading, once and only once, and the mount."""
+    n, bodies = len(state) // 2, len(tree.parent)
+    X, V = np.zeros((bodies, 12)), np.zeros((bodies, 6))
+    move_tree(tree, state[:n], state[n:], X, V)
+    M, C = pose_in(X, c.mount), pose_in(X, c.sleeve)
+    w, v, v_C = xyz(V[c.mount], 0), xyz(V[c.mount], 3), xyz(V[c.sleeve], 3)
+    mount = Mount(M.p, M.x, M.y, M.z, w, v, C.p)
+    dt = time - old.time
+    if dt < c.half and old.time >= 0.0:
+        return old, mount
+    turning = pushing = centre = _STILL
+    for i in c.below:
+        h, p = momentum(tree, i, X, V)
+        turning, pushing = plus(turning, h), plus(pushing, p)
+    for i in c.heavy:
+        centre = along(centre, tree.mass[i] / c.mass, mass_centre(tree, i, X))
+    dh = dp = alpha = a = a_C = _STILL
+    if old.time >= 0.0:
+        dh, dp = (
+            over(sub(turning, old.turning), dt),
+            over(sub(pushing, old.pushing), dt),
+        )
+        alpha, a = over(sub(w, old.w), dt), over(sub(v, old.v), dt)
+        a_C = over(sub(v_C, old.v_C), dt)
+    torque, push = spring_on_sleeve(
+        sub(C.p, pose_in(X, c.wall).p),
+        sub(v_C, xyz(V[c.wall], 3)),
+        xyz(V[c.sleeve], 0),
+        stiffness[0],
+        c.damping,
+    )
+    tilting = torque_on_sleeve(C, xyz(V[c.sleeve], 0), c.turning, c.turning_damping)
+    torque = plus(torque, tilting)
+    weight = scaled(c.mass, xyz(c.gravity, 0))
+    f, m = balance(dh, dp, load, centre, weight, C.p, torque, push, M)
+    return Moving(turning, pushing, w, v, v_C, time, f, m, alpha, a, a_C), mount
 
 
 @compiled
 def balance(
-    rate: np.ndarray,
-    load: np.ndarray,
-    centre: np.ndarray,
-    weight: np.ndarray,
-    p_WC: np.ndarray,
-    F_C: np.ndarray,
-    p_WM: np.ndarray,
-    R_WM: np.ndarray,
-) -> np.ndarray:
-    """What is `Felt`, element by element.
+    dh: Vector,
+    dp: Vector,
+    load: Load,
+    centre: Vector,
+    weight: Vector,
+    p_WC: Vector,
+    torque: Vector,
+    push: Vector,
+    M: Pose,
+) -> tuple[Vector, Vector]:
+    """Force and moment about M of the weld on what hangs below it, in M.
 
     Args:
-        rate: Of momentum about the world's origin, of V_WM and of v_WC, (15,).
-        load: Moment about the world's origin, and force, that are applied, (6,).
+        dh: Rate of angular momentum about the world's origin.
+        dp: Rate of momentum.
+        load: What else acts.
         centre: Of all mass that has weight, in W.
         weight: Its weight in N.
         p_WC: Of the sleeve.
-        F_C: The bushing's torque and force on it in W, the columns of (3, 2).
-        p_WM: Of the mount.
-        R_WM: Its orientation.
+        torque: Of the wall's spring on the sleeve, in W.
+        push: Its force.
+        M: The mount.
     """
-    torque, push = xyz(F_C[:, 0], 0), xyz(F_C[:, 1], 0)
-    f = sub(sub(xyz(rate, 3), xyz(load, 3)), plus(xyz(weight, 0), push))
-    m = sub(sub(xyz(rate, 0), xyz(load, 0)), plus(torque, cross(p_WC, push)))
-    m = sub(sub(m, cross(centre, weight)), cross(p_WM, f))
-    out = np.zeros(15)
-    for i in range(3):
-        for k in range(3):
-            out[i] += R_WM[k, i] * f[k]
-            out[3 + i] += R_WM[k, i] * m[k]
-    out[6:] = rate[6:]
-    return out
+    f = sub(sub(dp, load.f), plus(weight, push))
+    m = sub(sub(dh, load.m), plus(torque, cross(p_WC, push)))
+    m = sub(sub(m, cross(centre, weight)), cross(M.p, f))
+    return inwards(M, f), inwards(M, m)
 
 
-class WristSensor(Block):
+class WristSensor(StepBlock):
     """Reads what the arm does to all below the weld at the mount M.
 
     Port ``state`` accepts the plant's state.
@@ -87,6 +182,8 @@ class WristSensor(Block):
     plant's port of that name does; it need not be connected.
 
     Port ``felt`` emits what is `Felt`, of the last instant of its clock.
+
+    Port ``mount`` emits the `Mount` as it is now.
     """
 
     def __init__(
@@ -109,25 +206,34 @@ class WristSensor(Block):
             factor: The trocar's stiffness against the abdomen's, by time in s.
         """
         super().__init__()
-        self._plant, self._body, self._abdomen = plant, body, abdomen
-        self._below, self._factor = list(below), factor
-        self._heavy = [i for i in below if plant.is_gravity_enabled(i)]
-        self._bodies = {int(b) for i in below for b in plant.GetBodyIndices(i)}
-        context = plant.CreateDefaultContext()
-        self._weight = plant.gravity_field().gravity_vector() * plant.CalcTotalMass(
-            context, self._heavy
+        self._plant, self._factor = plant, factor
+        self._stiffness = abdomen.params.stiffness
+        bodies = [int(b) for i in below for b in plant.GetBodyIndices(i)]
+        self._bodies = set(bodies)
+        heavy = [i for i in below if plant.is_gravity_enabled(i)]
+        self._own = plant.CreateDefaultContext()  # for what else acts; always written
+        self._constants = packed(
+            mount=int(body.index()),
+            sleeve=int(abdomen.sleeve.index()),
+            wall=int(abdomen.wall.index()),
+            below=np.array(bodies),
+            heavy=np.array([int(b) for i in heavy for b in plant.GetBodyIndices(i)]),
+            mass=plant.CalcTotalMass(self._own, heavy),
+            gravity=plant.gravity_field().gravity_vector(),
+            damping=float(abdomen.params.damping),
+            turning=float(abdomen.params.turning_stiffness),
+            turning_damping=TURNING_DAMPING * abdomen.params.turning_stiffness,
+            half=0.5 * period,
         )
-        self._half = 0.5 * period
-        start = plant.GetPositionsAndVelocities(context)
+        self._tree = read_tree(plant)
+        start = plant.GetPositionsAndVelocities(self._own)
+        told = [len(start), 1, Load]
+        self._sense = wired(_sense, 2, [Moving], told, [Moving, Mount], True)
         self._state = self.vector_in("state", start.tolist())
         self._applied = self.DeclareAbstractInputPort(
             "applied_spatial_force", Value([ExternallyAppliedSpatialForce()])
         )
-        # Momentum and velocities at the last instant, its time, and what was felt.
-        initial = np.zeros(_MOVING + 1 + _FELT)
-        initial[_MOVING] = -1.0
-        self.DeclareDiscreteState(initial)
-        self._own = context  # to calculate in: all of it is written before it is read
+        self.DeclareDiscreteState(flat(_START))
         reads = {
             self._state.ticket(),
             self._applied.ticket(),
@@ -135,56 +241,31 @@ class WristSensor(Block):
             self.xd_ticket(),
         }
         self._next = self.cached("next", self._calc_next, reads)
-        self.signal_out("felt", Felt, self._calc_felt, {self._next.ticket()})
-        self.update_every(period, self._next.Eval)
+        last = size(Moving)
+        self._emit(self._next, {"felt": Felt, "mount": Mount}, last - size(Felt))
+        self.update_every(period, lambda context: self._next.Eval(context)[:last])
 
     def _calc_next(self, context: Any) -> np.ndarray:
-        """The state with this instant's reading, once and only once."""
-        old, time = context.get_discrete_state_vector().value(), context.get_time()
-        if time - old[_MOVING] < self._half and old[_MOVING] >= 0.0:
-            return old.copy()
-        plant, own, sleeve = self._plant, self._own, self._abdomen.sleeve
-        plant.SetPositionsAndVelocities(own, self._state.Eval(context))
-        V_WM = self._body.EvalSpatialVelocityInWorld(own).get_coeffs()
-        v_WC = sleeve.EvalSpatialVelocityInWorld(own).translational()
-        L = plant.CalcSpatialMomentumInWorldAboutPoint(own, self._below, _STILL)
-        moving = np.concatenate([L.get_coeffs(), V_WM, v_WC])
-        rate = np.zeros(_MOVING)
-        if old[_MOVING] >= 0.0:
-            rate = (moving - old[:_MOVING]) / (time - old[_MOVING])
-        K = self._abdomen.params.stiffness * self._factor(time)
-        self._abdomen.bushing.SetForceStiffnessConstants(own, [K] * 3)
-        F_C = self._abdomen.bushing.CalcBushingSpatialForceOnFrameC(own).get_coeffs()
-        X_WC, X_WM = sleeve.EvalPoseInWorld(own), self._body.EvalPoseInWorld(own)
-        centre = plant.CalcCenterOfMassPositionInWorld(own, self._heavy)
-        load = np.zeros(6)  # moment about the world's origin, and force
-        if self._applied.HasValue(context):
-            load = self._applied_load(context)
-        felt = balance(
-            rate,
-            load,
-            centre,
-            self._weight,
-            X_WC.translation(),
-            X_WC.rotation().matrix() @ F_C.reshape(2, 3).T,
-            X_WM.translation(),
-            X_WM.rotation().matrix(),
-        )
-        return np.concatenate([moving, [time], felt])
-
-    def _applied_load(self, context: Any) -> np.ndarray:
-        """Moment about the world's origin and force of all that is applied, (6,)."""
+        time, state = context.get_time(), self._state.Eval(context)
         load = np.zeros(6)
+        if self._applied.HasValue(context):
+            load = self._applied_load(context, state)
+        stiffness = np.array([self._stiffness * self._factor(time)])
+        old = context.get_discrete_state_vector().value()
+        return self._sense(
+            self._constants, self._tree, old, time, state, stiffness, load
+        )
+
+    def _applied_load(self, context: Any, state: np.ndarray) -> np.ndarray:
+        """The elements of the `Load`."""
+        load = np.zeros(6)
+        self._plant.SetPositionsAndVelocities(self._own, state)
         for one in self._applied.Eval(context):
             if int(one.body_index) in self._bodies:
                 body = self._plant.get_body(one.body_index)
                 p = body.EvalPoseInWorld(self._own).multiply(one.p_BoBq_B)
                 load += one.F_Bq_W.Shift(-p).get_coeffs()
         return load
-
-    def _calc_felt(self, context: Any) -> np.ndarray:
-        felt: np.ndarray = self._next.Eval(context)[_MOVING + 1 :]
-        return felt
 
 
 def add_wrist_sensor(

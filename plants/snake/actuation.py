@@ -69,7 +69,8 @@ def add_module(
 
 
 @compiled
-def _lengths(x: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
+def lengths(x: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
+    """Lengths of the wires of postures x (n, 7), into L (n, 9) (compiled)."""
     for i in range(len(x)):
         L[i] = 0.0
         for m in range(MODULES):
@@ -78,9 +79,10 @@ def _lengths(x: Any, rows: Any, R: float, e: float, h: float, L: Any) -> None:
 
 
 @compiled
-def _angles(
+def angles(
     L: Any, rows: Any, inverse: Any, R: float, e: float, h: float, ab: Any, off: Any
 ) -> None:
+    """Angles ab (n, 6) and residuals off (n, 3) of lengths L (n, 9) (compiled)."""
     left, p = np.empty(WIRES * MODULES), np.empty(WIRES)
     for i in range(len(L)):
         left[:] = L[i]
@@ -98,7 +100,7 @@ def _angles(
 
 
 @lru_cache(maxsize=16)
-def _matrices(R: float, d: float, first_azimuths: tuple[float, ...]) -> Any:
+def matrices(R: float, d: float, first_azimuths: tuple[float, ...]) -> Any:
     """Rows that take u to p_i, (9, 3), and each module's inverse, (3, 3, 3)."""
     turns = 2 * np.pi / WIRES * np.arange(WIRES)
     phi = np.add.outer(np.array(first_azimuths), turns).ravel()
@@ -110,7 +112,7 @@ def _matrices(R: float, d: float, first_azimuths: tuple[float, ...]) -> Any:
 
 def norm_rows(params: SnakeParams) -> Array:
     """Rows that take u to p_i, one a wire, (9, 3) in m."""
-    return _matrices(params.ball_radius, params.face, tuple(params.first_azimuths))[0]
+    return matrices(params.ball_radius, params.face, tuple(params.first_azimuths))[0]
 
 
 def _geometry(params: SnakeParams) -> tuple[float, float, float]:
@@ -129,7 +131,7 @@ def wire_lengths(x: ArrayLike, params: SnakeParams) -> Array:
     """
     x = whole_postures(x)
     L = np.empty((*x.shape[:-1], WIRES * MODULES))
-    _lengths(
+    lengths(
         np.ascontiguousarray(x.reshape(-1, 7)),
         norm_rows(params),
         *_geometry(params),
@@ -162,12 +164,12 @@ def angles_of_lengths(L: ArrayLike, params: SnakeParams) -> Angles:
     L = np.asarray(L, float)
     if L.ndim == 0 or L.shape[-1] != WIRES * MODULES:
         raise ValueError(f"L has shape {L.shape}, expected nine wires on the last axis")
-    rows, inverse = _matrices(
+    rows, inverse = matrices(
         params.ball_radius, params.face, tuple(params.first_azimuths)
     )
     ab = np.empty((*L.shape[:-1], 2 * MODULES))
     residual = np.empty((*L.shape[:-1], MODULES))
-    _angles(
+    angles(
         np.ascontiguousarray(L.reshape(-1, WIRES * MODULES)),
         rows,
         inverse,

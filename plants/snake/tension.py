@@ -40,9 +40,10 @@ def length_gradients(
 
 
 @compiled
-def _tensions(
+def tensions_of(
     ab: Any, tau: Any, rows: Any, R: float, h: float, e: float, least: float, T: Any
 ) -> None:
+    """As `tensions`, into T (9,) (compiled)."""
     J = np.empty((WIRES * MODULES, 2))
     for m in range(MODULES - 1, -1, -1):
         first = WIRES * m
@@ -119,5 +120,5 @@ def tensions(
     T = np.empty(WIRES * MODULES)
     R, e, h = params.ball_radius, params.plate_thickness, params.half_pitch
     ab, tau = np.asarray(ab, float), np.asarray(tau, float)
-    _tensions(ab, tau, norm_rows(params), R, h, e, least, T)
+    tensions_of(ab, tau, norm_rows(params), R, h, e, least, T)
     return T

@@ -17,7 +17,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 @compiled
-def _weight(
+def torques_of_weight(
     x: Any, h: float, tool: float, ball: float, plate: float, ring: float, g: Any
 ) -> Any:
     """Generalised forces of gravity on a1, b1, ..., b3 (6,) in Nm (compiled)."""
@@ -52,6 +52,12 @@ def _weight(
     return out
 
 
+def whole_mass(drive: SnakeDriveParams) -> float:
+    """Of all that the translation moves, in kg."""
+    balls = BALLS * (drive.ball_mass + drive.plate_mass)
+    return drive.carriage_mass + balls + drive.tool_mass
+
+
 def weight(
     x: Sequence[float] | NDArray[np.float64],
     params: SnakeParams,
@@ -70,8 +76,7 @@ def weight(
         Force in N, then torques in Nm, (7,).
     """
     d, g = drive, np.asarray(gravity, float)
-    all_ = d.carriage_mass + BALLS * (d.ball_mass + d.plate_mass) + d.tool_mass
-    torques = _weight(
+    torques = torques_of_weight(
         np.asarray(x, float),
         params.half_pitch,
         params.tool_offset,
@@ -80,4 +85,4 @@ def weight(
         d.tool_mass,
         g,
     )
-    return np.concatenate([[all_ * g[2]], torques])
+    return np.concatenate([[whole_mass(d) * g[2]], torques])

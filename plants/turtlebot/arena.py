@@ -1,7 +1,7 @@
 """What is seen of a navigation: floor, goal, robot with its vision circle, discs."""
 
 from collections.abc import Sequence
-from math import cos, pi, sin
+from math import atan2, cos, hypot, pi, sin
 from typing import Any
 
 from pydrake.common.value import Value
@@ -17,12 +17,14 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from plants.common.looks import DARK, GREEN, RED, STEEL, illustration
 from plants.crowd.signals import OBSTACLES
+from plants.crowd.walls import WallParams, segments
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
 from systems.common.signal import view
 
 FLOOR = [0.88, 0.89, 0.87, 1.0]
 BODY = [0.12, 0.37, 0.75, 1.0]
+WALL = [0.55, 0.52, 0.47, 0.6]
 SIGHT = [0.95, 0.75, 0.15, 1.0]
 HEIGHT = 0.4
 """Of an obstacle [m]."""
@@ -44,6 +46,7 @@ class Arena(Block):
         vision: float,
         goal: Sequence[float],
         floor: Sequence[float],
+        walls: Sequence[WallParams] = (),
     ) -> None:
         """Registers the bodies; the SceneGraph must not be built yet.
 
@@ -54,11 +57,13 @@ class Arena(Block):
             vision: Radius of its sight [m].
             goal: x, y [m].
             floor: Least x, least y, greatest x, greatest y [m].
+            walls: What stands.
         """
         super().__init__()
         self._graph = scene_graph
         self.source_id = scene_graph.RegisterSource("arena")
         self._draw_floor(goal, floor)
+        self._draw_walls(walls)
         self._robot_frame = self._add_frame("robot")
         self._draw_robot(radius, vision)
         self._frames = []
@@ -114,6 +119,16 @@ class Arena(Block):
             self._graph.RegisterAnchoredGeometry(
                 self.source_id, illustration(shape, X_WG, name, GREEN)
             )
+
+    def _draw_walls(self, walls: Sequence[WallParams]) -> None:
+        for k, (ax, ay, bx, by) in enumerate(segments(walls)):
+            length = hypot(bx - ax, by - ay)
+            if length > 0.0:
+                R_WA = RotationMatrix.MakeZRotation(atan2(by - ay, bx - ax))
+                middle = [0.5 * (ax + bx), 0.5 * (ay + by), 0.25]
+                shape, pose = Box(length, 0.02, 0.5), RigidTransform(R_WA, middle)
+                wall = illustration(shape, pose, f"wall_{k}", WALL)
+                self._graph.RegisterAnchoredGeometry(self.source_id, wall)
 
     def _draw_robot(self, radius: float, vision: float) -> None:
         frame = self._robot_frame

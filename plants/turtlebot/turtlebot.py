@@ -4,7 +4,7 @@ It is a `SymbolicVectorSystem`: Drake integrates it in C++.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated, Any, NamedTuple
 
 from pydrake.symbolic import Variable, cos, max, min, sin
@@ -31,10 +31,43 @@ class Command(NamedTuple):
     turn_rate: Annotated[float, Field("rad/s", "turn rate to take", 0.0)]
 
 
+BODIES: dict[str, dict[str, float]] = {
+    "turtlebot2": {},
+    "turtlebot3_burger": {
+        "radius": 0.113,
+        "speed": 0.22,
+        "turn_rate": 2.84,
+        "acceleration": 2.5,
+        "turn_acceleration": 3.2,
+    },
+    "turtlebot3_waffle": {
+        "radius": 0.208,
+        "speed": 0.26,
+        "turn_rate": 1.82,
+        "acceleration": 2.5,
+        "turn_acceleration": 3.2,
+    },
+    "turtlebot4": {
+        "radius": 0.171,
+        "speed": 0.46,
+        "turn_rate": 1.9,
+        "acceleration": 0.9,
+        "turn_acceleration": 7.7,
+    },
+}
+"""Sizes (a circle about the base) and speeds of their data sheets; accelerations of
+their drivers' limits, a TurtleBot 4's turning by its wheels' at 0.233 m of track."""
+
+
 @dataclass
 class TurtlebotParams:
     """A TurtleBot 2 (Kobuki base); accelerations as its drivers' usual limits."""
 
+    model: str = parameter(
+        "turtlebot2",
+        "whose numbers are taken for those left at a TurtleBot 2's",
+        choices=tuple(BODIES),
+    )
     radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
     speed: float = parameter(0.5, "greatest, either way", "m/s", above=0.0, most=3.0)
     turn_rate: float = parameter(1.8, "greatest", "rad/s", above=0.0, most=10.0)
@@ -46,6 +79,13 @@ class TurtlebotParams:
     lag: float = parameter(
         0.05, "time constant of the wheels' speed control", "s", least=0.02, most=1.0
     )
+
+    def __post_init__(self) -> None:
+        """Numbers that nobody gave are the model's."""
+        defaults = {f.name: f.default for f in fields(self)}
+        for name, value in BODIES.get(self.model, {}).items():
+            if getattr(self, name) == defaults[name]:
+                setattr(self, name, value)
 
 
 def make_turtlebot(params: TurtlebotParams, start: Sequence[float]) -> Any:

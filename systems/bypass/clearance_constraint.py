@@ -41,11 +41,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plants.organs.distance import Organs
+from plants.organs.organs import OrganSet, arrays, port
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
+from systems.bypass.organ_rows import organ_rows
 from systems.bypass.shadow_body import ObstacleTool, read_tool
-from systems.bypass.workspace import BORDERS, VIEW, WorkspaceParams, borders
+from systems.bypass.workspace import VIEW, WorkspaceParams, borders
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     all_finite,
@@ -336,6 +339,7 @@ def constrain(
     tools: np.ndarray,
     dodging: np.ndarray,
     drift: np.ndarray,
+    organs: Organs | None = None,
 ) -> tuple[Vector, np.ndarray, ClearanceStatus]:
     """One step: the tip's velocity nearest to the wanted one that is safe.
 
@@ -349,6 +353,7 @@ def constrain(
         tools: Rows of `ObstacleTool`.
         dodging: Whether R dodges each of them, 1 or 0; as many or more.
         drift: Velocities of R's trocar and of theirs, rows, m/s; one more.
+        organs: What else to keep clear of; None is compiled away.
 
     Returns:
         The tip's velocity in m/s, whether R dodges each tool, and the status.
@@ -356,8 +361,6 @@ def constrain(
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft)
     turning = min(q * params.turning_speed, lever(workspace, q) * workspace.wrist_speed)
-    most = 4 * len(tools) + BORDERS
-    rows, bounds = np.empty((most, 3)), np.empty(most)
     dodges = np.zeros(len(dodging))
     least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
     escape, blind = 0.0, 0.0
@@ -365,6 +368,13 @@ def constrain(
     inwards, room = borders(workspace, view_cone, g, p)
     # A tip that is outside comes back no faster than it may go at all.
     returning = np.minimum(-params.rate * room, 0.25 * params.max_speed)
+    further, least_rates = inwards, returning
+    if organs is not None:
+        organs_inwards, organs_returning = organ_rows(params, organs, g, p)
+        further = np.concatenate((organs_inwards, inwards))
+        least_rates = np.concatenate((organs_returning, returning))
+    most = 4 * len(tools) + len(least_rates)
+    rows, bounds = np.empty((most, 3)), np.empty(most)
     last = 0
     for i in range(len(tools)):
         tool = read_tool(tools[i])
@@ -415,21 +425,21 @@ def constrain(
         hurried = most_missed(wanted, rows[:last], bounds[:last])
         if dodge > 0.5 or hurried > _MISSED:
             escape = 1.0
-        rows[last : last + BORDERS], bounds[last : last + BORDERS] = inwards, returning
-        last += BORDERS
+        count = last + len(least_rates)
+        rows[last:count], bounds[last:count] = further, least_rates
         v, missed = nearest_velocity(
-            wanted, rows[:last], bounds[:last], u, params.max_speed, turning
+            wanted, rows[:count], bounds[:count], u, params.max_speed, turning
         )
         if dodge > 0.5 or missed > _MISSED:
             # The view, the last row, gives way.
-            last -= 1
+            count -= 1
             v, missed = nearest_velocity(
-                wanted, rows[:last], bounds[:last], u, params.max_speed, turning
+                wanted, rows[:count], bounds[:count], u, params.max_speed, turning
             )
             if dot(inwards[VIEW], v) < returning[VIEW] - _MISSED:
                 escape = blind = 1.0
         change = norm(sub(v, wanted))
-        # Several tools may ask for what cannot be had together.
+        # Several tools and organs may ask for what cannot be had together.
         if missed > _MISSED:
             holds = 0.0
         wanted = v
@@ -466,10 +476,11 @@ def trocar_drift(
 
 
 @compiled
-def _step(
+def hold(
     params: Any,
     margins: Any,
     workspace: Any,
+    organs: Organs | None,
     known: np.ndarray,
     v_R: Velocity,
     guide: Guide,
@@ -480,6 +491,7 @@ def _step(
     view_cone: ViewCone,
     permission: Permission,
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    """One step of the block, among organs or, None, without."""
     v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
     numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
     if not (all_usable(obstacles) and numbers):
@@ -504,9 +516,52 @@ def _step(
         tools,
         known[: count - 1],
         places[:, 3:],
+        organs,
     )
     after[: count - 1] = dodges
     return after, Velocity(scaled(s, v)), status
+
+
+@compiled
+def _step(
+    params: Any,
+    margins: Any,
+    workspace: Any,
+    state: np.ndarray,
+    v_R: Velocity,
+    guide: Guide,
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+    camera: Estimate,
+    view_cone: ViewCone,
+    permission: Permission,
+) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    known = (robot, obstacles, target, camera, view_cone, permission)
+    return hold(params, margins, workspace, None, state, v_R, guide, *known)
+
+
+@compiled
+def _step_among(
+    params: Any,
+    margins: Any,
+    workspace: Any,
+    values: np.ndarray,
+    table: np.ndarray,
+    state: np.ndarray,
+    v_R: Velocity,
+    guide: Guide,
+    robot: RobotTool,
+    obstacles: np.ndarray,
+    target: Estimate,
+    camera: Estimate,
+    view_cone: ViewCone,
+    permission: Permission,
+    moved: np.ndarray,
+) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
+    organs = Organs(values, table, moved)
+    known = (robot, obstacles, target, camera, view_cone, permission)
+    return hold(params, margins, workspace, organs, state, v_R, guide, *known)
 
 
 class ClearanceConstraint(StepBlock):
@@ -526,6 +581,7 @@ class ClearanceConstraint(StepBlock):
     Port ``view_cone`` accepts the `ViewCone`.
     Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
     Evasion is not slowed.
+    Port ``organs``, if there are any, accepts the `MovingPoint` of each.
     Port ``v_safe`` emits the `Velocity` of the guide point.
     Port ``status`` emits the `ClearanceStatus`.
 
@@ -540,6 +596,7 @@ class ClearanceConstraint(StepBlock):
         reach: ReachLimits | None = None,
         workspace: WorkspaceParams | None = None,
         obstacles: Sequence[str] = ("obstacle",),
+        organs: OrganSet | None = None,
     ) -> None:
         """Builds the block.
 
@@ -549,6 +606,7 @@ class ClearanceConstraint(StepBlock):
             reach: What the navigation behind it keeps to; the defaults if None.
             workspace: Further limits of R's tip; the defaults if None.
             obstacles: Names of the obstacle tools.
+            organs: What else to keep clear of; nothing if None.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -556,11 +614,12 @@ class ClearanceConstraint(StepBlock):
         super().__init__()
         params = params or ClearanceConstraintParams()
         self.declare_step(
-            _step,
+            _step if organs is None else _step_among,
             [
                 constants(params),
                 tools_around.constants(margins or Margins()),
                 limits.constants(reach, workspace),
+                *arrays(organs),
             ],
             {
                 "v_R": Velocity,
@@ -571,6 +630,7 @@ class ClearanceConstraint(StepBlock):
                 "camera": Estimate,
                 "view_cone": ViewCone,
                 "permission": Permission,
+                **port(organs),
             },
             np.zeros((len(obstacles) + 3) * (1 + _TROCAR)),
             {"v_safe": Velocity, "status": ClearanceStatus},

@@ -21,15 +21,15 @@ class VectorInput:
     reader must not write into what it gets, nor keep it.
     """
 
-    __slots__ = ("_evaluate", "_port")
+    __slots__ = ("_port", "vector")
 
     def __init__(self, port: Any) -> None:
         self._port = port
-        self._evaluate = port.EvalBasicVector
+        self.vector = port.EvalBasicVector
 
     def Eval(self, context: Any) -> np.ndarray:
         """The port's value in a context."""
-        return self._evaluate(context).value()
+        return self.vector(context).value()
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._port, name)

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 import hashlib
 from itertools import pairwise
-from operator import methodcaller
 from typing import Any
 
 import numpy as np
@@ -58,9 +57,17 @@ def wired(
 
     Returns:
         The map; it returns one array, what the step returns one after the other. All
-        blocks of a kind share it: compiled code is never freed.
+        blocks of a kind share its code: compiled code is never freed.
     """
-    return _wired(step, constants, tuple(states), tuple(inputs), tuple(gives), timed)
+    kinds = tuple(states), tuple(inputs), tuple(gives)
+    run, n = _wired(step, constants, *kinds, timed), sum(map(length, gives))
+
+    def given(*arrays: Any) -> np.ndarray:
+        array = np.empty(n)
+        run(*arrays, array)
+        return array
+
+    return given
 
 
 @cache
@@ -71,7 +78,11 @@ def _wired(
     inputs: tuple[Any, ...],
     gives: tuple[Any, ...],
     timed: bool,
-) -> Step:
+) -> Callable[..., None]:
+    """As `wired`, but the map writes into its last argument.
+
+    To return an array of its own costs a compiled function two calls of Python.
+    """
     kinds = [*states, *inputs]
     records = [f"k{i}" for i in range(constants)]
     arrays = [f"a{i}" for i in range(len(kinds))]
@@ -80,19 +91,16 @@ def _wired(
     for names in (arrays, taken):
         names[len(states) : len(states)] = ["time"] if timed else []
     given = ", ".join([*(f"{record}[0]" for record in records), *taken])
-    lines = [
-        f"{', '.join(values)}, = step({given})",
-        f"array = np.empty({sum(map(length, gives))})",
-    ]
+    lines = [f"{', '.join(values)}, = step({given})"]
     first = 0
     for signal, value in zip(gives, values, strict=True):
         lines += _given(signal, value, first)
         first += length(signal)
-    body = "".join(f"    {line}\n" for line in [*lines, "return array"])
+    body = "".join(f"    {line}\n" for line in lines)
     # The cache knows a function by its name and the types of its arguments.
     mark = hashlib.sha256(body.encode()).hexdigest()[:8]
     name = f"{step.__name__.strip('_')}_{mark}"
-    source = f"def {name}({', '.join([*records, *arrays])}):\n{body}"
+    source = f"def {name}({', '.join([*records, *arrays])}, array):\n{body}"
     signals = [kind for kind in kinds if not isinstance(kind, int | Many)]
     known = {signal.__name__: signal for signal in signals}
     return generated(source, name, step, {**known, "step": inlined(step), "np": np})
@@ -211,19 +219,35 @@ class StepBlock(Block):
         defaults: Mapping[str, Any],
     ) -> tuple[Callable[[Any], np.ndarray], set[Any]]:
         """The step as a function of the context, and the tickets of what it reads."""
-        run = wired(step, len(constants), states, list(inputs.values()), gives, timed)
+        kinds = tuple(states), tuple(inputs.values()), tuple(gives)
+        run = _wired(step, len(constants), *kinds, timed)
         ports = {name: self.signal_in(name, inputs[name]) for name in inputs}
-        reads: list[Callable[[Any], Any]] = [
-            *(_state_reader(group) for group in range(len(states))),
-            *([methodcaller("get_time")] if timed else []),
-            *(_port_reader(ports[name], defaults.get(name)) for name in inputs),
-        ]
-
-        def of_context(context: Any) -> np.ndarray:
-            return run(*constants, *[read(context) for read in reads])
-
         tickets = {port.ticket() for port in ports.values()}
-        return of_context, tickets | ({self.time_ticket()} if timed else set())
+        if timed:
+            tickets |= {self.time_ticket()}
+        # One function, for a call costs as much as what it reads.
+        names: dict[str, Any] = {"run": run, "empty": np.empty}
+        names |= {f"k{i}": constant for i, constant in enumerate(constants)}
+        taken = [f"k{i}" for i in range(len(constants))]
+        taken += [
+            f"context.get_discrete_state({i}).value()" for i in range(len(states))
+        ]
+        taken += ["context.get_time()"] if timed else []
+        for i, (name, port) in enumerate(ports.items()):
+            names |= {f"e{i}": port.vector, f"h{i}": port.HasValue}
+            read = f"e{i}(context).value()"
+            if name in defaults:
+                names[f"d{i}"] = flat(defaults[name])
+                read = f"({read} if h{i}(context) else d{i})"
+            taken.append(read)
+        source = (
+            "def of_context(context):\n"
+            f"    array = empty({sum(map(length, gives))})\n"
+            f"    run({', '.join([*taken, 'array'])})\n"
+            "    return array\n"
+        )
+        exec(source, names)
+        return names["of_context"], tickets
 
     def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
         """Declares outputs that are the shared array's parts from `first` on."""
@@ -236,25 +260,6 @@ class StepBlock(Block):
 
             self.signal_out(name, signal, part, {shared.ticket()})
             first = last
-
-
-def _state_reader(group: int) -> Callable[[Any], np.ndarray]:
-    """What reads a group of discrete state without a copy."""
-
-    def read(context: Any) -> np.ndarray:
-        state: np.ndarray = context.get_discrete_state(group).value()
-        return state
-
-    return read
-
-
-def _port_reader(port: Any, default: Any) -> Callable[[Any], np.ndarray]:
-    """What reads a port; its default, if it has one, where it is not connected."""
-    read: Callable[[Any], np.ndarray] = port.Eval
-    if default is None:
-        return read
-    is_told, instead = port.HasValue, flat(default)
-    return lambda context: read(context) if is_told(context) else instead
 
 
 def _kind(state: Any) -> Any:

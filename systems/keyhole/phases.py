@@ -16,7 +16,7 @@ from systems.common.signal import Vector, finiteness
 from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
 from systems.common.step_block import StepBlock
 from systems.common.stops import Code
-from systems.keyhole.signals import Phase, SnakeStatus, TubeStatus
+from systems.keyhole.signals import BodyDeviation, Phase, SnakeStatus, TubeStatus
 from systems.resection.wires.wire_watch import Alarm
 from systems.sensing.organ_estimator import OrganMotion
 
@@ -48,6 +48,7 @@ class Reason(Code):
     CALM = 10, "everything is calm again"
     GIVEN_UP = 11, "it does not become calm: the tool goes home"
     AWAY = 12, "the tube has left its station"
+    TILTED = 13, "the tube's tilt and offset bend the snake's body off its plan"
 
 
 @dataclass
@@ -78,6 +79,9 @@ class PhasesParams:
     sure_organ: float = parameter(
         6e-4, "sigma of the organ's motion", "m", above=0.0, most=0.02
     )
+    deviation: float = parameter(
+        1.5e-4, "of the snake's body from its plan", "m", above=0.0, most=0.1
+    )
     calm: float = parameter(
         2.0, "how long all must hold at the gate", "s", least=0.0, most=60.0
     )
@@ -99,6 +103,7 @@ class Chart(NamedTuple):
 
 finite_organ, finite_fulcrum = finiteness(OrganMotion), finiteness(Fulcrum)
 finite_tube, finite_snake = finiteness(TubeStatus), finiteness(SnakeStatus)
+finite_deviation = finiteness(BodyDeviation)
 finite_alarm, finite_permission = finiteness(Alarm), finiteness(Permission)
 
 
@@ -110,6 +115,7 @@ def fault(
     organ: OrganMotion,
     alarm: Alarm,
     permission: Permission,
+    deviation: BodyDeviation,
 ) -> int:
     """The `Reason` to stop, or that of the beginning if there is none."""
     if alarm.time >= 0.0:
@@ -120,6 +126,8 @@ def fault(
         return Reason.SENSOR.value
     if norm(chart.force) > c.loaded:
         return Reason.LOADED.value
+    if deviation.distance > c.deviation:
+        return Reason.TILTED.value
     return Reason.AWAY.value if tube.distance > c.far else Reason.BEGIN.value
 
 
@@ -149,11 +157,12 @@ def step(
     wrench: Wrench,
     permission: Permission,
     alarm: Alarm,
+    deviation: BodyDeviation,
 ) -> Chart:
     """One step of the statechart."""
     sound = finite_tube(tube) and finite_snake(snake) and finite_organ(organ)
     sound = sound and finite_fulcrum(fulcrum) and finite_permission(permission)
-    if not (sound and finite_alarm(alarm)):
+    if not (sound and finite_alarm(alarm) and finite_deviation(deviation)):
         if chart.code >= Phases.RETRACT.value:
             return Chart(chart.code, chart.since, chart.reason, 0.0, chart.force)
         return entered(chart, Phases.STOPPED.value, time, Reason.NUMBERS.value)
@@ -164,7 +173,7 @@ def step(
         if not norm(force) < 1e9:
             force = chart.force
     chart = Chart(chart.code, chart.since, chart.reason, chart.calm, force)
-    why = fault(c, chart, tube, organ, alarm, permission)
+    why = fault(c, chart, tube, organ, alarm, permission, deviation)
     arrived = tube.distance < c.near and tube.speed < c.slow
     quiet = is_calm(c, chart, organ, fulcrum) and arrived and not why
     calm = chart.calm + c.period if quiet else 0.0
@@ -201,6 +210,7 @@ def _update(
     wrench: Wrench,
     permission: Permission,
     alarm: Alarm,
+    deviation: BodyDeviation,
 ) -> tuple[Phase, Chart]:
     chart = step(
         c,
@@ -214,6 +224,7 @@ def _update(
         wrench,
         permission,
         alarm,
+        deviation,
     )
     pace = permission.speed_scale if finite_permission(permission) else 0.0
     return Phase(chart.code, chart.since, chart.reason, pace), chart
@@ -238,6 +249,8 @@ class OperationPhases(StepBlock):
 
     Port ``alarm`` accepts the wires' `Alarm`.
 
+    Port ``deviation`` accepts the snake's `BodyDeviation`.
+
     Port ``phase`` emits the `Phase`, from the next instant on.
     """
 
@@ -257,6 +270,7 @@ class OperationPhases(StepBlock):
                 "wrench": Wrench,
                 "permission": Permission,
                 "alarm": Alarm,
+                "deviation": BodyDeviation,
             },
             {
                 "phase": Phase(0.0, 0.0, 0.0, 0.0),

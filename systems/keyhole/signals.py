@@ -33,6 +33,12 @@ class TubeStatus(NamedTuple):
     speed: Annotated[float, Field("m/s", "against it", 0.0)]
 
 
+class BodyDeviation(NamedTuple):
+    """How far the snake's body is from its plan, because the tube is from its own."""
+
+    distance: Annotated[float, Field("m", "of what is in the organ, at the most", 2e-5)]
+
+
 class SnakeStatus(NamedTuple):
     """How far the snake is."""
 

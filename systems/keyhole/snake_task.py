@@ -12,31 +12,48 @@ in C, where tube and organ will be when it is reached.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.inverse_kernels import REACHED, solve_tool
+from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
 from plants.snake.tool_target import seen_from, target_of
-from systems.common.block import Block
-from systems.common.compiled import compiled
-from systems.common.geometry import along, pose_of, row_of
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import (
+    Pose,
+    along,
+    inwards,
+    norm,
+    outwards,
+    plus,
+    pose_of,
+    row_of,
+    sub,
+)
 from systems.common.parameter import check, parameter
-from systems.common.signal import flat, reader, size, view, writer
+from systems.common.signal import finiteness, flat, reader, size, writer
+from systems.common.step_block import StepBlock
 from systems.keyhole.phases import Phases
-from systems.keyhole.signals import Phase, SnakeStatus, TubePose
+from systems.keyhole.signals import BodyDeviation, Phase, SnakeStatus, TubePose
 from systems.resection.wires.procedure_player import (
     ProcedurePlayerParams,
+    Profile,
     posture_at,
-    schedule,
+    profile,
 )
 from systems.sensing.organ_estimator import OrganMotion
 
 Floats = np.ndarray
 _ALONG = (0.0, 0.0, 1.0)
-read_tube, read_target = reader(TubePose), reader(ToolTarget)
+FAR = 0.1
+"""Deviation in m of a body that cannot be where it should."""
+read_tube, read_organ = reader(TubePose), reader(OrganMotion)
+finite_tube, finite_organ = finiteness(TubePose), finiteness(OrganMotion)
 write_target = writer(ToolTarget)
 
 
@@ -76,6 +93,7 @@ class Way(NamedTuple):
     retreat: float
 
 
+@compiled
 def smooth(share: float) -> float:
     """A share in [0, 1] with soft ends."""
     share = min(max(share, 0.0), 1.0)
@@ -83,66 +101,192 @@ def smooth(share: float) -> float:
 
 
 @compiled
-def in_channel(
-    target: Floats, E: Floats, p_WE: Floats, tube: Floats, gap: float
-) -> Floats:
-    """A target given in E, in C; all as elements.
-
-    Args:
-        target: Of a `ToolTarget`.
-        E: x and z axes of E in W, (2, 3).
-        p_WE: The entry.
-        tube: Of a `TubePose`.
-        gap: From the tube's end to C.
-    """
-    at = read_tube(tube)
-    C = pose_of(along(at.p, gap, at.z), at.x, at.z)
-    return write_target(
-        seen_from(read_target(target), pose_of(p_WE, row_of(E, 0), row_of(E, 1)), C)
-    )
+def in_channel(target: ToolTarget, E: Pose, tube: TubePose, gap: float) -> ToolTarget:
+    """A target given in E, in C, which stands `gap` beyond the tube's end."""
+    C = pose_of(along(tube.p, gap, tube.z), tube.x, tube.z)
+    return seen_from(target, E, C)
 
 
 @compiled
-def target_elements(x: Floats, h: float, tool: float) -> Floats:
-    """The elements of the `ToolTarget` of a posture x (7,)."""
-    return write_target(target_of(x, h, tool))
+def posture_on(plan: Any, turn: float, clock: float) -> Any:
+    """The posture (7,) of a `Plan`, its arrays and turn, at a time in s."""
+    x, times, full, v, waits, ramp = plan
+    last = times[-1]
+    if turn >= 0.0 and clock > last:
+        clock = turn + (clock - turn) % (last - turn)
+    return posture_at(x, times, full, v, waits, ramp, clock)
 
 
 @dataclass
 class Plan:
-    """What the tool is to do: postures in E, and when each is reached.
+    """What the tool is to do: postures in E, and how they are played.
 
     Attributes:
         postures: As s, a1, b1, ..., b3, (n, 7).
-        times: In s, (n,), rising.
+        profile: When each is reached, and how fast.
+        ramp: Time from rest to full speed, in s.
         turn: The plan is played again and again from this time on, in s; once if
             negative.
     """
 
     postures: Floats
-    times: Floats
+    profile: Profile
+    ramp: float = 1.0
     turn: float = -1.0
 
     @property
     def end(self) -> float:
         """When it is done, in s; never if it is played again."""
-        return float(self.times[-1]) if self.turn < 0.0 else np.inf
+        return float(self.profile.times[-1]) if self.turn < 0.0 else np.inf
+
+    @property
+    def arrays(self) -> Any:
+        """What `posture_at` takes before the time."""
+        return (self.postures, *self.profile, self.ramp)
 
     def posture(self, clock: float) -> Floats:
         """The posture (7,) at a time of its clock in s."""
-        last = float(self.times[-1])
-        if self.turn >= 0.0 and clock > last:
-            clock = self.turn + (clock - self.turn) % (last - self.turn)
-        return posture_at(self.postures, self.times, clock)
+        posture: Floats = posture_on(self.arrays, self.turn, clock)
+        return posture
 
 
 def planned(postures: ArrayLike, player: ProcedurePlayerParams) -> Plan:
-    """A session's plan at the rates of a player."""
+    """A session's plan as its player plays it."""
     x = np.array(postures, float)
-    return Plan(x, schedule(x, player))
+    return Plan(x, profile(x, player), max(player.turn, player.lead))
 
 
-class SnakeTask(Block):
+def evenly(postures: Floats, times: Floats, turn: float = -1.0) -> Plan:
+    """Postures (n, 7) at given times in s (n,), at an even speed between two."""
+    n = len(times)
+    even = Profile(times, np.zeros(n - 1), np.zeros(n), np.zeros(n))
+    return Plan(postures, even, turn=turn)
+
+
+@compiled
+def _go(c: Any, now: Way, phase: Phase) -> tuple[Way, SnakeStatus]:
+    """The way one period later, and the status."""
+    way, clock, retreat = now
+    code = float(Phases.STOPPED.value) if isnan(phase.code) else phase.code
+    dt, whole = c.period, c.ends[3]
+    retreat += dt / c.retreat if code == Phases.STOPPED.value else -dt / c.back
+    retreat = min(max(retreat, 0.0), 1.0)
+    if code == Phases.RESECT.value and retreat == 0.0:
+        if way >= whole:
+            clock = min(clock + dt, c.end)
+        way = min(way + dt, whole)
+    if code == Phases.RETRACT.value and retreat == 0.0:
+        if clock >= c.end:
+            clock = 0.0 if way < whole else clock
+            way = max(way - dt, 0.0)
+        elif clock > 0.0:
+            clock = max(clock - c.rewind * dt, 0.0)
+        else:
+            way = max(way - dt, 0.0)
+    over, entered = c.ends[1], c.ends[2]
+    share = (now.way - over) / (entered - over)
+    rate = 0.0
+    if 0.0 < share < 1.0 and code in (Phases.RESECT.value, Phases.RETRACT.value):
+        rate = c.advance * 6.0 * share * (1.0 - share) / (entered - over)
+        if code == Phases.RETRACT.value:
+            rate = -rate
+    return Way(way, clock, retreat), SnakeStatus(
+        now.way / whole,
+        c.advance * smooth(share),
+        rate,
+        now.clock,
+        min(c.end - now.clock, 1e6),
+        now.retreat,
+    )
+
+
+@compiled
+def _tool(c: Any, plan: Any, now: Way) -> ToolTarget:
+    """The tool in E, from the third leg on."""
+    over, entered, whole = c.ends[1], c.ends[2], c.ends[3]
+    x: Any = np.zeros(7)
+    if now.way >= whole:
+        x = posture_on(plan, c.turn, now.clock)
+    elif now.way > entered:
+        share = smooth((now.way - entered) / (whole - entered))
+        x[0] = c.entry
+        x += share * (c.begin - x)
+    else:
+        x[0] = c.before + smooth((now.way - over) / (entered - over)) * (
+            c.entry - c.before
+        )
+    x[5:] *= 1.0 - smooth(now.retreat)
+    return target_of(x, c.half_pitch, c.tool_offset)
+
+
+@compiled
+def body_deviation(
+    x: Floats, C: Pose, E: Pose, h: float, tool: float, bend: float
+) -> float:
+    """How far the body in the organ is from where a posture has it, in m.
+
+    The inverse kinematics keeps tool and intermediate axis where they are to be in E,
+    so what lies before them bends otherwise once C and E are apart.
+
+    Args:
+        x: The posture in E, (7,).
+        C: The channel.
+        E: The entry.
+        h: Half the pitch.
+        tool: The tool's offset.
+        bend: Largest of a ball.
+    """
+    a, b, q = np.empty((POINTS, 3)), np.empty((POINTS, 3)), np.empty(7)
+    corners(x, h, tool, a)
+    p, n, m = seen_from(target_of(x, h, tool), E, C)
+    axes = np.array(p), np.array(n), np.array(m)
+    if solve_tool(*axes, h, tool, bend, (-1.0, 1.0), q) != REACHED:
+        return FAR
+    corners(q, h, tool, b)
+    most, before = 0.0, (0.0, 0.0, 0.0)
+    for i in range(POINTS - 1):
+        in_W = plus(C.p, outwards(C, row_of(b, i)))
+        off = sub(inwards(E, sub(in_W, E.p)), row_of(a, i))
+        if a[i, 2] > 0.0:
+            if i > 0 and a[i - 1, 2] < 0.0:  # where the body passes the entry
+                share = -a[i - 1, 2] / (a[i, 2] - a[i - 1, 2])
+                most = norm(along(before, share, sub(off, before)))
+            most = max(most, norm(off))
+        before = off
+    return most
+
+
+@compiled
+def _aim(
+    constants: Floats, plan: Any, way: Floats, held: Floats, tube: Floats, organ: Floats
+) -> tuple[Floats, float]:
+    """The elements of the target in C, and how far the body is from the plan."""
+    c, at, entry = constants[0], read_tube(tube), read_organ(organ)
+    if not (finite_tube(at) and finite_organ(entry)):
+        return held.copy(), FAR
+    now, out, over = Way(way[0], way[1], way[2]), c.ends[0], c.ends[1]
+    z = c.inside + c.speed * min(now.way, out) + c.length
+    in_tube = write_target(ToolTarget((0.0, 0.0, z), _ALONG, _ALONG))
+    E = pose_of(entry.p, row_of(c.axes, 0), row_of(c.axes, 1))
+    C = pose_of(along(at.p, c.gap, at.z), at.x, at.z)
+    if c.follow == 0.0:
+        E = pose_of(C.p, E.x, at.z)
+    x = posture_on(plan, c.turn, now.clock)
+    away = body_deviation(x, C, E, c.half_pitch, c.tool_offset, c.max_bend)
+    if now.way <= out:
+        return in_tube, away
+    told = write_target(in_channel(_tool(c, plan, now), E, at, c.gap))
+    share = smooth((now.way - out) / (over - out))
+    return in_tube + share * (told - in_tube), away
+
+
+@compiled
+def _reference(constants: Floats, plan: Any, way: Floats) -> Floats:
+    """The elements of the tool's target in E."""
+    return write_target(_tool(constants[0], plan, Way(way[0], way[1], way[2])))
+
+
+class SnakeTask(StepBlock):
     """What the snake is to do.
 
     Port ``phase`` accepts the operation's `Phase`.
@@ -156,6 +300,8 @@ class SnakeTask(Block):
     Port ``reference`` emits the `ToolPose` in E of this instant.
 
     Port ``status`` emits the `SnakeStatus`.
+
+    Port ``deviation`` emits the `BodyDeviation` of the posture that is next.
     """
 
     def __init__(
@@ -178,51 +324,68 @@ class SnakeTask(Block):
             standoff: Of the tube's station from the entry, in m.
         """
         super().__init__()
-        p = self._p = check(params or SnakeTaskParams())
-        self._snake = check(snake or SnakeParams())
+        p, snake = check(params or SnakeTaskParams()), check(snake or SnakeParams())
         if plan is None:
             straight = np.zeros((2, 7))
             straight[:, 0] = -0.035, -0.030
-            plan = Plan(straight, np.array([0.3, 1.3]))
-        self._plan, self._gap = plan, gap
-        self._axes = np.array(axes, float)
-        length = 3 * self._snake.straight_module + self._snake.tool_offset
-        self._length, self._advance = length, standoff - gap
+            plan = evenly(straight, np.array([0.3, 1.3]))
+        length = 3 * snake.straight_module + snake.tool_offset
+        advance = standoff - gap
         # Translations in C: within the tube, just out of it.
-        self._inside = -gap - length - self._snake.tool_radius - 1e-3
-        self._outside = -gap + 1e-3
-        begin = plan.posture(0.0)
+        self._inside, outside = -gap - length - snake.tool_radius - 1e-3, -gap + 1e-3
+        begin = np.array(plan.postures[0])
         # Translations in E: at the tube's end at its station, and at the entry.
-        self._before = self._outside - self._advance
-        self._entry = min(float(begin[0]), self._outside)
-        straight = np.array([self._entry, *np.zeros(6)])
-        bend = float(np.abs(begin - straight)[1:].max()) / p.bend_rate
+        before, entry = outside - advance, min(float(begin[0]), outside)
+        bend = float(np.abs(begin[1:]).max()) / p.bend_rate
         legs = [
-            (self._outside - self._inside) / p.speed,
+            (outside - self._inside) / p.speed,
             p.change,
-            1.5 * max(self._entry - self._before, 1e-3) / p.speed,
-            1.5 * max(bend, abs(float(begin[0]) - self._entry) / p.speed),
+            1.5 * max(entry - before, 1e-3) / p.speed,
+            1.5 * max(bend, abs(float(begin[0]) - entry) / p.speed),
         ]
-        self._ends = np.cumsum(legs)
-        self._straight, self._begin = straight, begin
-        self._phase = self.signal_in("phase", Phase)
+        ends = np.cumsum(legs)
+        self._least = 2.0 * float(ends[-1]) + plan.end
+        self._constants = packed(
+            p,
+            ends=ends,
+            axes=np.array(axes, float),
+            begin=begin,
+            inside=self._inside,
+            before=before,
+            entry=entry,
+            length=length,
+            advance=advance,
+            gap=gap,
+            end=plan.end,
+            turn=plan.turn,
+            half_pitch=snake.half_pitch,
+            tool_offset=snake.tool_offset,
+            max_bend=snake.max_bend,
+        )
+        self._plan = plan.arrays
         self._tube = self.signal_in("tube", TubePose)
         self._organ = self.signal_in("organ", OrganMotion)
+        gives, told = [Way, SnakeStatus], {"phase": Phase}
+        go, on = self._runner(_go, [self._constants], [Way], told, gives, False, {})
         self.DeclareDiscreteState(flat(Way(0.0, 0.0, 0.0)))
-        held = np.array([0.0, 0.0, self._inside + length, *_ALONG, *_ALONG])
-        self._held = self.DeclareDiscreteState(held)
-        state, phase = {self.xd_ticket()}, {self._phase.ticket()}
-        reads = state | phase | {self._tube.ticket(), self._organ.ticket()}
-        self._next = self.cached("next", self._calc_next, state | phase)
+        held = ToolTarget((0.0, 0.0, self._inside + length), _ALONG, _ALONG)
+        self._held = self.DeclareDiscreteState(flat(held))
+        state = {self.xd_ticket()}
+        self._next = self.cached("next", go, state | on)
+        reads = {*state, *on, self._tube.ticket(), self._organ.ticket()}
         self._target = self.cached("target", self._calc_target, reads)
-        self.signal_out(
-            "target", ToolTarget, self._target.Eval, {self._target.ticket()}
-        )
+        aimed = {self._target.ticket()}
+        self.signal_out("target", ToolTarget, self._calc_aim, aimed)
+        self.signal_out("deviation", BodyDeviation, self._calc_deviation, aimed)
         self.signal_out("reference", ToolPose, self._calc_reference, state)
-        self.signal_out("status", SnakeStatus, self._calc_status, state | phase)
+        last = size(Way)
+        self._emit(self._next, {"status": SnakeStatus}, last)
         self.update_every(
             p.period,
-            lambda context: [self._next.Eval(context), self._target.Eval(context)],
+            lambda context: [
+                self._next.Eval(context)[:last],
+                self._calc_aim(context),
+            ],
         )
 
     @property
@@ -233,97 +396,27 @@ class SnakeTask(Block):
     @property
     def time(self) -> float:
         """Least time in s from the gate to the plan's end, and home again."""
-        return 2.0 * float(self._ends[-1]) + self._plan.end
+        return self._least
 
-    def _way(self, context: Any) -> Way:
-        return Way(*context.get_discrete_state(0).value().tolist())
+    def _calc_aim(self, context: Any) -> Floats:
+        target: Floats
+        target, _ = self._target.Eval(context)
+        return target
 
-    def _calc_next(self, context: Any) -> Floats:
-        """The way one period later."""
-        p, (way, clock, retreat) = self._p, self._way(context)
-        code = view(Phase, self._phase.Eval(context)).code
-        dt, whole = p.period, float(self._ends[-1])
-        if np.isnan(code):  # as if it were stopped
-            code = Phases.STOPPED
-        drawn = code == Phases.STOPPED
-        retreat += dt / p.retreat if drawn else -dt / p.back
-        retreat = min(max(retreat, 0.0), 1.0)
-        if code == Phases.RESECT and retreat == 0.0:
-            way, more = min(way + dt, whole), dt if way >= whole else 0.0
-            clock = min(clock + more, self._plan.end)
-        if code == Phases.RETRACT and retreat == 0.0:
-            if clock >= self._plan.end:
-                clock = 0.0 if way < whole else clock
-                way = max(way - dt, 0.0)
-            elif clock > 0.0:
-                clock = max(clock - p.rewind * dt, 0.0)
-            else:
-                way = max(way - dt, 0.0)
-        return np.array([way, clock, retreat])
+    def _calc_deviation(self, context: Any) -> list[float]:
+        _, away = self._target.Eval(context)
+        return [away]
 
-    def _posture(self, now: Way) -> Floats:
-        """The posture in E from the third leg on."""
-        _, over, entered, whole = self._ends
-        if now.way >= whole:
-            x = self._plan.posture(now.clock).copy()
-        elif now.way > entered:
-            share = smooth((now.way - entered) / (whole - entered))
-            x = self._straight + share * (self._begin - self._straight)
-        else:
-            share = smooth((now.way - over) / (entered - over))
-            x = np.zeros(7)
-            x[0] = self._before + share * (self._entry - self._before)
-        x[5:] *= 1.0 - smooth(now.retreat)
-        return x
-
-    def _calc_target(self, context: Any) -> Floats:
-        tube, organ = self._tube.Eval(context), self._organ.Eval(context)
-        held: Floats = context.get_discrete_state(self._held).value()
-        if not (np.isfinite(tube).all() and np.isfinite(organ).all()):
-            return held.copy()
-        now = Way(*self._next.Eval(context).tolist())
-        out, over = self._ends[:2]
-        z = self._inside + self._p.speed * min(now.way, out) + self._length
-        in_tube = np.array([0.0, 0.0, z, *_ALONG, *_ALONG])
-        if now.way <= out:
-            return in_tube
-        p_WE, E = view(OrganMotion, organ).p.copy(), self._axes
-        if not self._p.follow:
-            at = view(TubePose, tube)
-            p_WE, E = at.p + self._gap * at.z, np.stack([E[0], at.z])
-        told = in_channel(self._tool(now), E, p_WE, tube.copy(), self._gap)
-        share = smooth((now.way - out) / (over - out))
-        return in_tube + share * (told - in_tube)
+    def _calc_target(self, context: Any) -> tuple[Floats, float]:
+        return _aim(
+            self._constants,
+            self._plan,
+            self._next.Eval(context),
+            context.get_discrete_state(self._held).value(),
+            self._tube.Eval(context),
+            self._organ.Eval(context),
+        )
 
     def _calc_reference(self, context: Any) -> Floats:
-        return self._tool(self._way(context))[: size(ToolPose)]
-
-    def _tool(self, now: Way) -> Floats:
-        """The elements of the `ToolTarget` in E, from the third leg on."""
-        snake, x = self._snake, self._posture(now)
-        tool: Floats = target_elements(x, snake.half_pitch, snake.tool_offset)
-        return tool
-
-    def _calc_status(self, context: Any) -> Floats:
-        now = self._way(context)
-        over, entered = self._ends[1:3]
-        share = (now.way - over) / (entered - over)
-        rate = 0.0
-        if 0.0 < share < 1.0:
-            slope = 6.0 * share * (1.0 - share) / (entered - over)
-            rate = self._advance * slope
-            code = view(Phase, self._phase.Eval(context)).code
-            if code == Phases.RETRACT:
-                rate = -rate
-            elif code != Phases.RESECT:
-                rate = 0.0
-        return np.array(
-            [
-                now.way / float(self._ends[-1]),
-                self._advance * smooth(share),
-                rate,
-                now.clock,
-                min(self._plan.end - now.clock, 1e6),
-                now.retreat,
-            ]
-        )
+        way = context.get_discrete_state(0).value()
+        return _reference(self._constants, self._plan, way)[: size(ToolPose)]

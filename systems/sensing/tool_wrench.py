@@ -19,18 +19,15 @@ import math
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from plants.abdomen.abdomen import Abdomen
 from plants.instruments.instrument import InstrumentParams
-from plants.instruments.wrist_sensor import Felt, add_wrist_sensor
+from plants.instruments.wrist_sensor import Felt, Mount, add_wrist_sensor
 from systems.common.block import Block
 from systems.common.compiled import packed
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import example, flat, size, view
+from systems.common.signal import example, flat, size
 from systems.common.signals import ShaftMotion, Wrench
 from systems.common.step_block import wired
 from systems.sensing import sensor_noise
@@ -43,7 +40,6 @@ from systems.sensing.wrench_kernel import (
     wall_wrench,
 )
 
-_NOWHERE = np.zeros(3)
 _UNLOADED = flat(NO_LOAD)
 _SHAFT = size(ShaftMotion)
 _ROW = _SHAFT + size(Wrench)
@@ -158,9 +154,7 @@ class ToolWrench(Block):
 
     Port ``felt`` accepts the reading, `Felt`.
 
-    Port ``body_poses`` accepts the plant's port of that name.
-
-    Port ``body_spatial_velocities`` accepts the plant's port of that name.
+    Port ``mount`` accepts the `Mount` that it sits on.
 
     Port ``load`` accepts the `Load` that slides along it; none without a wire.
 
@@ -173,36 +167,30 @@ class ToolWrench(Block):
         self,
         params: ToolWrenchParams | None = None,
         instrument: InstrumentParams | None = None,
-        body: int = 0,
-        sleeve: int = -1,
         sleeve_mass: float = 0.0,
     ) -> None:
-        """Makes the block for the sensor at a place of the plant's lists.
+        """Makes the block.
 
         Args:
             params: Noise, bias, range.
             instrument: What hangs below the sensor.
-            body: Place of the instrument in `body_poses`.
-            sleeve: Place of the trocar's sleeve in it; negative for none.
-            sleeve_mass: In kg.
+            sleeve_mass: Of the trocar's sleeve in kg; 0 for none.
         """
         super().__init__()
         p = self._params = params or ToolWrenchParams()
         check(p)
         instrument = instrument or InstrumentParams()
         share = 1.0 + p.mass_error
-        self._body, self._sleeve = body, sleeve
         self._constants = packed(
             mass=share * instrument.mass,
             centre=instrument.centre,
             inertia=share * transverse_inertia(instrument),
             force_range=float(p.force_range),
             moment_range=float(p.moment_range),
-            sleeve_mass=share * sleeve_mass if sleeve >= 0 else 0.0,
+            sleeve_mass=share * sleeve_mass,
         )
-        # Where a number stands, the kernels take one of Drake's arrays as it is.
-        self._move = wired(shaft_motion, 0, [], [9, 3, 3, 3], [ShaftMotion], False)
-        reading = [9, ShaftMotion, 3, 3, 3, 3, 3, Fault, 3, 3, Load]
+        self._move = wired(shaft_motion, 0, [], [Mount], [ShaftMotion], False)
+        reading = [Mount, Felt, Fault, Load]
         self._read = wired(wall_wrench, 1, [], reading, [Wrench], False)
         self._silence = flat(SILENCE)
         step = math.sqrt(p.period)
@@ -215,17 +203,10 @@ class ToolWrench(Block):
         self._faults = (noise, drift, tuple(zero.tolist()))
         self._felt = self.signal_in("felt", Felt)
         self._load = self.signal_in("load", Load)
-        self._poses = self.DeclareAbstractInputPort(
-            "body_poses", Value([RigidTransform()])
-        )
-        self._velocities = self.DeclareAbstractInputPort(
-            "body_spatial_velocities", Value([SpatialVelocity.Zero()])
-        )
-        moving = {self._poses.ticket(), self._velocities.ticket()}
-        self._motion = self.cached("motion", self._calc_motion, moving)
-        late = {self.xd_ticket()}
+        self._mount = self.signal_in("mount", Mount)
+        late, moving = {self.xd_ticket()}, {self._mount.ticket()}
         feeling = {
-            self._motion.ticket(),
+            *moving,
             self._felt.ticket(),
             self._load.ticket(),
             self.time_ticket(),
@@ -245,43 +226,21 @@ class ToolWrench(Block):
                 "shaft", ShaftMotion, lambda context: _late(context)[:_SHAFT], late
             )
         else:
-            self.signal_out(
-                "shaft", ShaftMotion, self._calc_shaft, {self._motion.ticket()}
-            )
-
-    def _calc_motion(self, context: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The shaft, the mount's angular velocity, and R_WM."""
-        X_WM = self._poses.Eval(context)[self._body]
-        V_WM = self._velocities.Eval(context)[self._body]
-        R_WM, w = X_WM.rotation().matrix(), V_WM.rotational()
-        shaft = self._move(R_WM, X_WM.translation(), V_WM.translational(), w)
-        return shaft, w, R_WM
+            self.signal_out("shaft", ShaftMotion, self._calc_shaft, moving)
 
     def _calc_shaft(self, context: Any) -> np.ndarray:
-        return self._motion.Eval(context)[0]
+        return self._move(self._mount.Eval(context))
 
     def _calc_wrench(self, context: Any) -> np.ndarray:
         p = self._params
         time = context.get_time()
         if p.lost and silent(p.lost, time):
             return self._silence
-        shaft, w, R_WM = self._motion.Eval(context)
-        felt = view(Felt, self._felt.Eval(context))
-        p_WC = _NOWHERE
-        if self._sleeve >= 0:
-            p_WC = self._poses.Eval(context)[self._sleeve].translation()
         return self._read(
             self._constants,
-            R_WM,
-            shaft,
-            w,
-            felt.alpha,
-            felt.a,
-            felt.f,
-            felt.m,
+            self._mount.Eval(context),
+            self._felt.Eval(context),
             sensor_noise.fault(p.seed, max(0, round(time / p.period)), self._faults),
-            p_WC,
-            felt.a_C,
             self._load.Eval(context) if self._load.HasValue(context) else _UNLOADED,
         )
 
@@ -322,12 +281,9 @@ def add_tool_wrench(
     sensor = add_wrist_sensor(
         builder, plant, body, abdomen, below, params.period, factor
     )
-    places = (int(body.index()), int(abdomen.sleeve.index()))
     block = builder.AddNamedSystem(
-        "tool_wrench",
-        ToolWrench(params, instrument, *places, abdomen.params.sleeve_mass),
+        "tool_wrench", ToolWrench(params, instrument, abdomen.params.sleeve_mass)
     )
-    builder.Connect(sensor.GetOutputPort("felt"), block.GetInputPort("felt"))
-    for name in ("body_poses", "body_spatial_velocities"):
-        builder.Connect(plant.GetOutputPort(name), block.GetInputPort(name))
+    for name in ("felt", "mount"):
+        builder.Connect(sensor.GetOutputPort(name), block.GetInputPort(name))
     return block

@@ -19,7 +19,7 @@ from systems.switching.fields import (
     repulsive_field,
 )
 from systems.switching.navigation_planner import PERIOD, NavigationPlanner, Planned
-from systems.switching.signals import Goal, Mode, PlanarVelocity, Seen
+from systems.switching.signals import Corner, Goal, Mode, PlanarVelocity, Seen
 
 FORMS = ("khatib", "printed")
 ATTRACTIONS = ("gradient", "printed")
@@ -117,6 +117,7 @@ class ClassicalPlanner(NavigationPlanner):
     Port ``robot`` accepts the `RobotState`.
     Port ``seen`` accepts rows of `Seen`.
     Port ``goal`` accepts the `Goal`.
+    Port ``corners`` accepts rows of `Corner`, which do not matter to it.
     Port ``v_R`` emits the `PlanarVelocity` to take.
     Port ``mode`` emits the `Mode`, always the same: there is one state only.
     """
@@ -135,7 +136,12 @@ class ClassicalPlanner(NavigationPlanner):
         self.declare(period)
 
     def plan(
-        self, robot: RobotState, goal: Goal, seen: list[Seen], *memory: Any
+        self,
+        robot: RobotState,
+        goal: Goal,
+        seen: list[Seen],
+        corners: list[Corner],
+        *memory: Any,
     ) -> Planned:
         """The velocity to take; nothing is remembered."""
         vx, vy = summed_fields(self.params, (robot.x, robot.y), goal, seen)

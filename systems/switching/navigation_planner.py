@@ -11,12 +11,23 @@ from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.signal import reader, size
-from systems.switching.signals import SEEN, Goal, Mode, PlanarVelocity, Seen
+from systems.switching.signals import (
+    CORNERS,
+    EDGES,
+    SEEN,
+    Corner,
+    Goal,
+    Mode,
+    PlanarVelocity,
+    Seen,
+)
 
 PERIOD = 0.05
 """Of all planners, in s."""
 
 SEEN_SIZE = size(Seen)
+SHAPE = (EDGES, size(Corner))
+NO_CORNERS = np.zeros(size(CORNERS))
 read_seen = reader(Seen)
 
 
@@ -30,7 +41,7 @@ class Planned(NamedTuple):
 
 @compiled
 def in_sight(
-    robot: np.ndarray, goal: np.ndarray, seen: np.ndarray
+    robot: np.ndarray, goal: np.ndarray, seen: np.ndarray, corners: np.ndarray
 ) -> tuple[bool, np.ndarray]:
     """Whether all numbers are finite; the rows of `Seen` that hold an obstacle."""
     rows = seen.reshape((len(seen) // SEEN_SIZE, SEEN_SIZE))
@@ -39,7 +50,8 @@ def in_sight(
         if read_seen(rows[k]).track >= 0.0:
             there[count] = rows[k]
             count += 1
-    return isfinite(robot.sum() + goal.sum() + seen.sum()), there[:count]
+    total = robot.sum() + goal.sum() + seen.sum() + corners.sum()
+    return isfinite(total), there[:count]
 
 
 class NavigationPlanner(Block):
@@ -58,6 +70,7 @@ class NavigationPlanner(Block):
         self._robot = self.signal_in("robot", RobotState)
         self._seen = self.signal_in("seen", SEEN)
         self._goal = self.signal_in("goal", Goal)
+        self._corners = self.signal_in("corners", CORNERS)
         self.state_out("v_R", PlanarVelocity, np.zeros(size(PlanarVelocity)))
         self._mode = self.state_out("mode", Mode, np.array(Mode()))
         self._memory = [self.DeclareDiscreteState([*part]) for part in memory]
@@ -66,13 +79,21 @@ class NavigationPlanner(Block):
 
     def _update(self, context: Any) -> Sequence[Any]:
         robot, goal = self._robot.Eval(context), self._goal.Eval(context)
-        known, there = in_sight(robot, goal, self._seen.Eval(context))
+        hiding = NO_CORNERS
+        if self._corners.HasValue(context):
+            hiding = self._corners.Eval(context)
+        known, there = in_sight(robot, goal, self._seen.Eval(context), hiding)
         memory = [self._held(context, group) for group in self._memory]
         if known:
             planned = self.plan(
                 RobotState(*robot.tolist()),
                 Goal(*goal.tolist()),
                 [*map(Seen._make, there.tolist())],
+                [
+                    c
+                    for c in map(Corner._make, hiding.reshape(SHAPE).tolist())
+                    if c.there
+                ],
                 *memory,
             )
         else:
@@ -86,7 +107,12 @@ class NavigationPlanner(Block):
 
     @abstractmethod
     def plan(
-        self, robot: RobotState, goal: Goal, seen: list[Seen], *memory: Any
+        self,
+        robot: RobotState,
+        goal: Goal,
+        seen: list[Seen],
+        corners: list[Corner],
+        *memory: Any,
     ) -> Planned:
         """What is held from now on.
 
@@ -94,6 +120,7 @@ class NavigationPlanner(Block):
             robot: The body.
             goal: Where it shall go.
             seen: The obstacles in sight.
+            corners: Behind which somebody may be.
             *memory: What the planner remembers.
         """
 

@@ -15,7 +15,7 @@ from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
 from systems.common.signal import finiteness, reader, size
 from systems.common.step_block import StepBlock
-from systems.switching.signals import NOISE, SEEN, Noise, Seen
+from systems.switching.signals import NOISE, SEEN, STANDING, Noise, Seen
 
 SEEN_SIZE = size(Seen)
 read_obstacle = reader(Obstacle)
@@ -54,9 +54,10 @@ def perceive(
         noise: Rows of `Noise`, one for each: four standard normal numbers.
 
     Returns:
-        Rows of `Seen`.
+        Rows of `Seen`; those of points that stand are empty.
     """
-    seen = np.zeros((len(obstacles), SEEN_SIZE))
+    seen = np.zeros((len(obstacles) + STANDING, SEEN_SIZE))
+    seen[:, 0] = -1.0
     reach = params.vision * params.vision
     s, w = params.position_noise, params.velocity_noise
     for track in range(len(obstacles)):

@@ -17,6 +17,14 @@ class Seen(NamedTuple):
     v_y: Annotated[float, Field("m/s", "velocity", -0.3)]
 
 
+class Corner(NamedTuple):
+    """An edge behind which the robot does not see."""
+
+    there: Annotated[float, Field("1", "1 if there is one", 1.0)]
+    x: Annotated[float, Field("m", "of the edge", 1.5)]
+    y: Annotated[float, Field("m", "of the edge", 0.8)]
+
+
 class Noise(NamedTuple):
     """What an obstacle's measurement is wrong by, in standard deviations."""
 
@@ -52,5 +60,10 @@ class Mode(NamedTuple):
     ] = 0.0
 
 
-SEEN = Many(Seen, ROWS)
+STANDING = 64
+"""Number of points of what stands that there is room for, beside the obstacles."""
+SEEN = Many(Seen, (*ROWS, *(f"s{k}" for k in range(STANDING))))
+EDGES = 12
+"""Number of corners that there is room for."""
+CORNERS = Many(Corner, tuple(map(str, range(EDGES))))
 NOISE = Many(Noise, ROWS)

@@ -17,7 +17,7 @@ from plants.turtlebot.turtlebot import RobotState
 from systems.common.parameter import check, parameter
 from systems.switching.fields import attractive_field, helicoid_field
 from systems.switching.navigation_planner import PERIOD, NavigationPlanner, Planned
-from systems.switching.signals import Goal, Mode, PlanarVelocity, Seen
+from systems.switching.signals import Corner, Goal, Mode, PlanarVelocity, Seen
 
 ATTRACTIVE, TO_CIRCLE, ROUND_OBSTACLE = range(3)
 STATES = ("attractive", "about Omega", "about the obstacle")
@@ -184,6 +184,7 @@ class StatechartPlanner(NavigationPlanner):
     Port ``robot`` accepts the `RobotState`.
     Port ``seen`` accepts rows of `Seen`.
     Port ``goal`` accepts the `Goal`.
+    Port ``corners`` accepts rows of `Corner`, which do not matter to it.
     Port ``v_R`` emits the `PlanarVelocity` to take.
     Port ``mode`` emits the `Mode`; its states are `STATES`.
     """
@@ -202,7 +203,12 @@ class StatechartPlanner(NavigationPlanner):
         self.declare(period, Manoeuvre())
 
     def plan(
-        self, robot: RobotState, goal: Goal, seen: list[Seen], *memory: Any
+        self,
+        robot: RobotState,
+        goal: Goal,
+        seen: list[Seen],
+        corners: list[Corner],
+        *memory: Any,
     ) -> Planned:
         """The velocity to take; remembers the manoeuvre."""
         (m,) = memory

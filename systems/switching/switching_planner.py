@@ -10,7 +10,7 @@ from systems.switching.navigation_planner import (
     Planned,
     velocity,
 )
-from systems.switching.signals import Goal, Mode, PlanarVelocity, Seen
+from systems.switching.signals import Corner, Goal, Mode, PlanarVelocity, Seen
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import SwitchingParams, SwitchingState
 
@@ -24,6 +24,7 @@ class SwitchingPlanner(NavigationPlanner):
     Port ``robot`` accepts the `RobotState`.
     Port ``seen`` accepts rows of `Seen`.
     Port ``goal`` accepts the `Goal`; another one starts afresh.
+    Port ``corners`` accepts rows of `Corner`; slower where somebody may step out.
     Port ``v_R`` emits the `PlanarVelocity` to take.
     Port ``mode`` emits the `Mode`; its states are `MODES`.
     """
@@ -42,14 +43,19 @@ class SwitchingPlanner(NavigationPlanner):
         self.declare(period, Goal(0.0, 0.0), SwitchingState())
 
     def plan(
-        self, robot: RobotState, goal: Goal, seen: list[Seen], *memory: Any
+        self,
+        robot: RobotState,
+        goal: Goal,
+        seen: list[Seen],
+        corners: list[Corner],
+        *memory: Any,
     ) -> Planned:
         """The velocity to take; remembers the goal and the rules' state."""
         last_goal, state = memory
         if goal != last_goal:
             state = SwitchingState()
         here = (robot.x, robot.y)
-        step = plan(self.params, state, here, velocity(robot), goal, seen)
+        step = plan(self.params, state, here, velocity(robot), goal, seen, corners)
         followed = (step.state.mode, step.state.track, step.state.side)
         mode = Mode(*followed, float(step.retreat), float(step.outrun))
         return Planned(PlanarVelocity(step.v_x, step.v_y), mode, (goal, step.state))

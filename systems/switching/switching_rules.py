@@ -22,7 +22,7 @@ from systems.switching.groups import (
     shorter_side,
     way_round,
 )
-from systems.switching.signals import Seen
+from systems.switching.signals import Corner, Seen
 from systems.switching.switching_state import (
     ATTRACTIVE,
     BYPASS,
@@ -63,6 +63,7 @@ def plan(
     velocity: Point,
     goal: Point,
     obstacles: Sequence[Seen],
+    corners: Sequence[Corner] = (),
 ) -> Plan:
     """One step of the switching planner.
 
@@ -73,6 +74,7 @@ def plan(
         velocity: How it moves [m/s].
         goal: Where it shall go [m].
         obstacles: The obstacles in sight.
+        corners: Edges behind which somebody may be.
 
     Returns:
         The velocity to take, and what to remember.
@@ -119,6 +121,8 @@ def plan(
     vx, vy, state = _step(params, state, sight)
     if standing:
         vx, vy = _slow_down(params, sight, vx, vy)
+    if corners:
+        vx, vy = _slow_for_unseen(params, sight, corners, vx, vy)
     retreat = False
     if moving:
         clearance = params.body_radius + params.margins[0]
@@ -327,6 +331,49 @@ def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> P
     narrow = params.body_radius + 0.5 * params.margins[-1]
     free = time_to_enter(ex, ey, sight.standing, narrow)
     limit = max(sqrt(2.0 * params.deceleration * free), 0.1 * params.speed)
+    if limit >= speed:
+        return vx, vy
+    return limit * ex, limit * ey
+
+
+def _slow_for_unseen(
+    params: SwitchingParams,
+    sight: Sight,
+    corners: Sequence[Corner],
+    vx: float,
+    vy: float,
+) -> Point:
+    """Limits the speed so that the body stands before who steps out can reach it.
+
+    Who walks at `unseen_speed` w from the edge the moment it is passed is seen, and
+    after the time `reaction` T the body brakes with `braking` a: while it does, for
+    T + v/a, its way may come no nearer to the edge than w (T + v/a). A body that
+    stands is not in the way of anybody who looks where they go.
+    """
+    speed = hypot(vx, vy)
+    if speed < 1e-9 or params.unseen_speed == 0.0:
+        return vx, vy
+    ex, ey = vx / speed, vy / speed
+    a, w, t_r = params.braking, params.unseen_speed, params.reaction
+    limit = speed
+    for corner in corners:
+        qx, qy = corner.x - sight.px, corner.y - sight.py
+        along, across = qx * ex + qy * ey, qx * ey - qy * ex
+        if along <= 0.0:
+            continue
+        low, high = 0.0, limit
+        for _ in range(6):  # the free distance falls with the speed: by halves
+            v = high if high == limit and low == 0.0 else 0.5 * (low + high)
+            stop = v * t_r + 0.5 * v * v / a
+            gap = hypot(max(along - stop, 0.0), across) - params.body_radius
+            if gap >= w * (t_r + v / a):
+                low = v
+                if v == limit:
+                    break
+            else:
+                high = v
+        limit = low
+    limit = max(limit, params.creep * params.speed)
     if limit >= speed:
         return vx, vy
     return limit * ex, limit * ey

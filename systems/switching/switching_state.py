@@ -106,6 +106,26 @@ class SwitchingParams:
         least=0.0,
         most=10.0,
     )
+    unseen_speed: float = parameter(
+        0.5,
+        "of who may step out from where the body does not see; 0 for nobody",
+        "m/s",
+        least=0.0,
+        most=5.0,
+    )
+    braking: float = parameter(
+        1.0, "deceleration when somebody does", "m/s^2", above=0.0, most=10.0
+    )
+    reaction: float = parameter(
+        0.2,
+        "until it brakes: a scan, a step, the wheels' lag",
+        "s",
+        least=0.0,
+        most=2.0,
+    )
+    creep: float = parameter(
+        0.2, "share of the speed at which every corner is passed", above=0.0, most=1.0
+    )
     approach_gain: float = parameter(
         2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
     )

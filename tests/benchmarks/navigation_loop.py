@@ -6,20 +6,26 @@ from math import atan2, cos, hypot, sin
 from time import perf_counter
 from typing import Any
 
-from systems.switching.signals import Seen
+import numpy as np
+
+from plants.crowd.walls import wall_distance
+from systems.switching.signals import Corner, Seen
 from systems.switching.unicycle_control import (
     UnicycleControlParams,
     constants,
     heading_law,
 )
 from tests.benchmarks.navigation_scenes import Frame, Robot, Scene
+from tests.benchmarks.sensed import Sensed, Senses
 
 Command = tuple[float, float, bool]
 """Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
 
-Step = Callable[[float, float, float, float, float, list[Seen]], Command]
-"""(x, y, heading, v_x, v_y, obstacles in sight) -> what to do."""
+Step = Callable[[float, float, float, float, float, list[Seen], list[Corner]], Command]
+"""(x, y, heading, v_x, v_y, obstacles in sight, corners) -> what to do."""
 
+REACH = 0.2
+"""Of the true goal [m], for a robot that only believes to be there."""
 Planner = Callable[[Scene], Step]
 """Makes a fresh planner for a scene."""
 
@@ -35,6 +41,7 @@ class Result:
     ratio: float  # length over the straight way
     walls: list[float]  # s, wall time of each planner step
     path: list[tuple[float, float]]
+    astray: float = 0.0  # m, greatest distance of the believed place from the true one
 
 
 def closest(qx: float, qy: float, ux: float, uy: float, dt: float) -> float:
@@ -62,11 +69,15 @@ def unicycle(
     speeds: tuple[float, float],
     wanted: Command,
     dt: float,
+    astray: float = 0.0,
 ) -> tuple[tuple[float, float, float], tuple[float, float]]:
-    """One step of the heading law on a unicycle with limited accelerations."""
+    """One step of the heading law on a unicycle with limited accelerations.
+
+    Its believed heading is wrong by `astray` [rad].
+    """
     x, y, theta = pose
     speed, rate = speeds
-    target, turn = heading_law(law, theta, *wanted)
+    target, turn = heading_law(law, theta + astray, *wanted)
     dv = robot.acceleration * dt
     dw = robot.turn_acceleration * dt
     speed = min(max(target, speed - dv), speed + dv)
@@ -80,8 +91,17 @@ def unicycle(
     return pose, (speed, rate)
 
 
-def run(scene: Scene, planner: Planner) -> Result:
-    """Runs one scene until the goal, a collision or the time limit."""
+def run(
+    scene: Scene, planner: Planner, senses: Senses | None = None, seed: int = 0
+) -> Result:
+    """Runs one scene until the goal, a collision or the time limit.
+
+    Args:
+        scene: The world.
+        planner: Who drives.
+        senses: What the robot has to see with; the truth within sight if None.
+        seed: Of their noise.
+    """
     robot, dt = scene.robot, scene.dt
     x, y = scene.start
     theta = atan2(scene.goal[1] - y, scene.goal[0] - x)
@@ -93,17 +113,24 @@ def run(scene: Scene, planner: Planner) -> Result:
     walls: list[float] = []
     path = [(x, y)]
     straight = hypot(scene.goal[0] - x, scene.goal[1] - y)
-    outcome = "timeout"
+    outcome, astray = "timeout", 0.0
     k = 0
     frame: Frame = scene.frames(0)
+    sensed = Sensed(scene, senses, seed) if senses else None
+    reach = max(robot.reach, REACH) if senses else robot.reach
     for k in range(int(scene.time_limit / dt)):
-        seen = [
-            Seen(float(i), a, b, r, u, v)
-            for i, (a, b, r, u, v) in enumerate(frame)
-            if hypot(a - x, b - y) <= robot.vision
-        ]
+        if sensed is None:
+            seen = [
+                Seen(float(i), a, b, r, u, v)
+                for i, (a, b, r, u, v) in enumerate(frame)
+                if hypot(a - x, b - y) <= robot.vision
+            ]
+            place, hiding = (x, y, theta), []
+        else:
+            place, seen, hiding = sensed.at((x, y, theta), (vx, vy), frame, k * dt)
+        astray = max(astray, hypot(place[0] - x, place[1] - y))
         start = perf_counter()
-        wanted = step(x, y, theta, vx, vy, seen)
+        wanted = step(*place, vx, vy, seen, hiding)
         walls.append(perf_counter() - start)
         if robot.holonomic:
             size = hypot(wanted[0], wanted[1])
@@ -112,7 +139,7 @@ def run(scene: Scene, planner: Planner) -> Result:
             nx, ny = x + dt * vx, y + dt * vy
         else:
             (nx, ny, theta), speeds = unicycle(
-                robot, law, (x, y, theta), speeds, wanted, dt
+                robot, law, (x, y, theta), speeds, wanted, dt, place[2] - theta
             )
             vx, vy = (nx - x) / dt, (ny - y) / dt
         after = scene.frames(k + 1)
@@ -120,6 +147,9 @@ def run(scene: Scene, planner: Planner) -> Result:
             qx, qy = a - x, b - y
             ux, uy = (c - a) / dt - vx, (d - b) / dt - vy
             clearance = min(clearance, closest(qx, qy, ux, uy, dt) - r - robot.radius)
+        if scene.walls:
+            gap = wall_distance(scene.walls, np.array([nx, ny])).item()
+            clearance = min(clearance, gap - robot.radius)
         length += hypot(nx - x, ny - y)
         x, y = nx, ny
         frame = after
@@ -127,9 +157,16 @@ def run(scene: Scene, planner: Planner) -> Result:
         if clearance < 0.0:
             outcome = "collided"
             break
-        if hypot(scene.goal[0] - x, scene.goal[1] - y) < robot.reach:
+        if hypot(scene.goal[0] - x, scene.goal[1] - y) < reach:
             outcome = "reached"
             break
     return Result(
-        outcome, (k + 1) * dt, clearance, length, length / straight, walls, path
+        outcome,
+        (k + 1) * dt,
+        clearance,
+        length,
+        length / straight,
+        walls,
+        path,
+        astray,
     )

@@ -5,7 +5,7 @@ computed beforehand. Every suite is a function of a seed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 import itertools
 from math import cos, hypot, pi, sin
@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from plants.crowd.orca import orca_towards
 from plants.crowd.signals import Obstacle
+from plants.crowd.walls import WallParams
 
 Frame = list[tuple[float, float, float, float, float]]
 """x, y [m], radius [m], v_x, v_y [m/s] of every obstacle at one instant."""
@@ -53,6 +54,7 @@ class Scene:
     robot: Robot = field(default_factory=lambda: TURTLEBOT)
     dt: float = 0.05  # s
     time_limit: float = 90.0  # s
+    walls: list[WallParams] = field(default_factory=list)
 
 
 def steady(discs: list[tuple[float, float, float, float, float]], dt: float):
@@ -344,6 +346,17 @@ def crowd_5(seed: int, count: int = 500) -> list[Scene]:
 def crowd_20(seed: int, count: int = 200) -> list[Scene]:
     """CrowdNav circle crossing, twenty humans to whom the robot is invisible."""
     return _crowd(seed, 20, count)
+
+
+def in_hall(scene: Scene, half: float = 9.8) -> Scene:
+    """The same world in a hall, by whose walls a robot can find its place.
+
+    What moves goes through them.
+    """
+    x, y = (0.5 * (a + b) for a, b in zip(scene.start, scene.goal, strict=True))
+    low_x, high_x, low_y, high_y = x - half, x + half, y - half, y + half
+    corners = [[low_x, low_y], [high_x, low_y], [high_x, high_y], [low_x, high_y]]
+    return replace(scene, walls=[WallParams([*corners, corners[0]])])
 
 
 SUITES: dict[str, Callable[..., list[Scene]]] = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from systems.switching.arcs import Disc, time_to_enter
 from systems.switching.classical_planner import ClassicalParams, summed_fields
-from systems.switching.signals import Seen
+from systems.switching.signals import Corner, Seen
 from systems.switching.statechart_planner import (
     Manoeuvre,
     StatechartParams,
@@ -32,15 +32,22 @@ def switching(scene: Scene) -> Step:
         body_radius=robot.radius,
         speed=robot.speed,
         vision=robot.vision,
+        braking=robot.acceleration or 1.0,
         response=0.0 if robot.holonomic else SwitchingParams.response,
     )
     state = SwitchingState()
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+        x: float,
+        y: float,
+        theta: float,
+        vx: float,
+        vy: float,
+        seen: list[Seen],
+        corners: list[Corner],
     ) -> Command:
         nonlocal state
-        result = plan(params, state, (x, y), (vx, vy), scene.goal, seen)
+        result = plan(params, state, (x, y), (vx, vy), scene.goal, seen, corners)
         state = result.state
         return result.v_x, result.v_y, result.retreat
 
@@ -55,7 +62,13 @@ def noisy(position: float = 0.05, velocity: float = 0.1) -> Planner:
         inner = switching(scene)
 
         def step(
-            x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+            x: float,
+            y: float,
+            theta: float,
+            vx: float,
+            vy: float,
+            seen: list[Seen],
+            corners: list[Corner],
         ) -> Command:
             shown = []
             for o in seen:
@@ -68,7 +81,7 @@ def noisy(position: float = 0.05, velocity: float = 0.1) -> Planner:
                         v_y=o.v_y + velocity * v,
                     )
                 )
-            return inner(x, y, theta, vx, vy, shown)
+            return inner(x, y, theta, vx, vy, shown, corners)
 
         return step
 
@@ -90,7 +103,13 @@ def classical(scene: Scene) -> Step:
     params = ClassicalParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+        x: float,
+        y: float,
+        theta: float,
+        vx: float,
+        vy: float,
+        seen: list[Seen],
+        corners: list[Corner],
     ) -> Command:
         velocity = summed_fields(params, (x, y), scene.goal, seen)
         return *velocity, _retreats(scene, x, y, seen)
@@ -104,7 +123,13 @@ def statechart(scene: Scene) -> Step:
     memory = Manoeuvre()
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+        x: float,
+        y: float,
+        theta: float,
+        vx: float,
+        vy: float,
+        seen: list[Seen],
+        corners: list[Corner],
     ) -> Command:
         nonlocal memory
         ux, uy, memory = statechart_step(params, memory, (x, y), scene.goal, seen)
@@ -120,7 +145,13 @@ def orca(scene: Scene) -> Step:
     robot = scene.robot
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+        x: float,
+        y: float,
+        theta: float,
+        vx: float,
+        vy: float,
+        seen: list[Seen],
+        corners: list[Corner],
     ) -> Command:
         world = pyrvo.RVOSimulator()
         world.set_time_step(scene.dt)
@@ -157,7 +188,13 @@ def hrvo(scene: Scene) -> Step:
     behavior.target = core.Target.Point(scene.goal, 0.5 * robot.reach)
 
     def step(
-        x: float, y: float, theta: float, vx: float, vy: float, seen: list[Seen]
+        x: float,
+        y: float,
+        theta: float,
+        vx: float,
+        vy: float,
+        seen: list[Seen],
+        corners: list[Corner],
     ) -> Command:
         behavior.pose = core.Pose2((x, y), 0.0)
         behavior.twist = core.Twist2((vx, vy), 0.0)

@@ -42,9 +42,11 @@ DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
     "gauze_dynamic_real": [],
+    "gauze_press": [],
     "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],
+    "nav_lidar_crowd": [],
     "snake_wire_break": [],
     "snake_unstable": [],
     "resect_paper": ["spacing=0.001", "reach_effort=0.05"],
@@ -206,7 +208,8 @@ COMMANDS = {
 come to zero, and which are poses or set-points, that must come to a halt."""
 OBSERVE = {
     *("FulcrumEstimator", "OperationPhases", "OpticalTracker", "OrganEstimator"),
-    *("Perception", "RobotLocation", "SnakeLoad", "SnakeLocation", "StationTarget"),
+    *("GridMapping", "Perception", "RobotLocation", "SnakeLoad", "SnakeLocation"),
+    *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
 }

@@ -35,16 +35,16 @@ class ProcedurePlayerParams:
         most=0.1,
     )
     bend_rate: float = parameter(
-        1.2, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+        1.5, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
     )
     travel_rate: float = parameter(
-        0.010, "largest speed of the translation", "m/s", least=1e-4, most=0.5
+        0.020, "largest speed of the translation", "m/s", least=1e-4, most=0.5
     )
     bend_acceleration: float = parameter(
-        30.0, "largest, of a or b of a ball", "rad/s2", least=0.1, most=1e3
+        40.0, "largest, of a or b of a ball", "rad/s2", least=0.1, most=1e3
     )
     travel_acceleration: float = parameter(
-        0.25, "largest, of the translation", "m/s2", least=1e-3, most=10.0
+        0.5, "largest, of the translation", "m/s2", least=1e-3, most=10.0
     )
     dwell: float = parameter(
         0.3, "at the beginning and at the end", "s", above=0.0, most=60.0
@@ -113,7 +113,8 @@ def _corner_speeds(full: Any, u: Any, rest: Any, turn: float, jump: float) -> An
         most = 1e-9
         for r in range(7):
             most = max(most, abs(u[i, r] - u[i - 1, r]))
-        v[i] = 0.0 if rest[i] else min(jump / most, 1.0)
+        # Means of a period are compared: each is half a ramp faster than the corner.
+        v[i] = 0.0 if rest[i] else min(max(jump / most - jump / 2, 0.0), 1.0)
     for i in range(1, n):
         v[i] = min(v[i], math.sqrt(v[i - 1] ** 2 + 2 * full[i - 1] / turn))
     for i in range(n - 2, -1, -1):
@@ -190,16 +191,28 @@ def schedule(
     return profile(x, params, waits).times
 
 
+@compiled
 def posture_at(
-    x: NDArray[np.float64], times: NDArray[np.float64], time: float
-) -> NDArray[np.float64]:
-    """The posture (7,) at a time in s, of postures (n, 7) reached at times (n,)."""
-    n = int(np.searchsorted(times, time))
+    x: Any, times: Any, full: Any, v: Any, waits: Any, turn: float, time: float
+) -> Any:
+    """The posture (7,) at a time in s, speeding up and slowing down between two.
+
+    Args:
+        x: Postures (n, 7).
+        times: As `Profile` has them, and so on.
+        full: If it is zero, a way is gone at an even speed.
+        v: Speeds.
+        waits: Waits.
+        turn: Time from rest to full speed in s.
+        time: Of the posture.
+    """
+    n = np.searchsorted(times, time)
     if n == 0 or n == len(times):
-        return x[min(n, len(x) - 1)]
-    share = (time - times[n - 1]) / (times[n] - times[n - 1])
-    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
-    return between
+        return x[min(n, len(x) - 1)].copy()
+    begin = times[n - 1] + waits[n - 1]
+    share = max(time - begin, 0.0) / (times[n] - begin)
+    share = way_share(full[n - 1], v[n - 1], v[n], turn, share)
+    return x[n - 1] + share * (x[n] - x[n - 1])
 
 
 def played(
@@ -208,17 +221,10 @@ def played(
     params: ProcedurePlayerParams,
     time: float,
 ) -> NDArray[np.float64]:
-    """The posture (7,) at a time in s, speeding up and slowing down between two."""
-    times, full, v, waits = profile
-    n = int(np.searchsorted(times, time))
-    if n == 0 or n == len(times):
-        return x[min(n, len(x) - 1)]
-    begin = times[n - 1] + waits[n - 1]
-    share = max(time - begin, 0.0) / (times[n] - begin)
+    """The posture (7,) at a time in s of a profile, see `posture_at`."""
     turn = max(params.turn, params.lead)
-    share = way_share(full[n - 1], v[n - 1], v[n], turn, share)
-    between: NDArray[np.float64] = x[n - 1] + share * (x[n] - x[n - 1])
-    return between
+    posture: NDArray[np.float64] = posture_at(x, *profile, turn, time)
+    return posture
 
 
 class ProcedurePlayer(Block):

@@ -6,17 +6,18 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.inverse_kernels import REACHED
-from plants.snake.inverse_kinematics import tool_posture
+from plants.snake.inverse_kernels import REACHED, solve_tool
 from plants.snake.parameters import SnakeParams
-from plants.snake.posture import Array
-from plants.snake.signals import REST, Posture, ToolTarget
-from systems.common.block import Block
+from plants.snake.signals import REST, Numbers, Posture, ToolTarget
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import norm, over
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, flat, view
+from systems.common.signal import Field, finiteness
+from systems.common.step_block import StepBlock
 
 HOLD = -1
 """Status of an input that is no pose at all."""
+finite_target = finiteness(ToolTarget)
 
 
 class IkStatus(NamedTuple):
@@ -33,58 +34,82 @@ class ResectionIkParams:
 
     period: float = parameter(0.02, "of the postures", "s", least=1e-3, most=0.1)
     bend_rate: float = parameter(
-        1.5, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+        2.0, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
     )
     travel_rate: float = parameter(
         0.03, "largest speed of the translation", "m/s", least=1e-4, most=0.5
     )
 
 
-def time_between(one: Array, other: Array, params: ResectionIkParams) -> float:
+@compiled
+def time_between(c: Any, one: Numbers, other: Numbers) -> float:
     """Least time in s from x to another x at full rates, all joints together."""
-    rates = [params.travel_rate] + [params.bend_rate] * (len(one) - 1)
-    return float((np.abs(other - one) / rates).max())
+    most = abs(other[0] - one[0]) / c.travel_rate
+    for i in range(1, len(one)):
+        most = max(most, abs(other[i] - one[i]) / c.bend_rate)
+    return most
 
 
 class Motion(NamedTuple):
     """How a posture x follows its goal."""
 
-    x: Annotated[Array, Field("m, rad", "where it is to be now", REST)]
-    goal: Annotated[Array, Field("m, rad", "what was last asked for", REST)]
-    start: Annotated[Array, Field("m, rad", "where the move under way began", REST)]
+    x: Annotated[Numbers, Field("m, rad", "where it is to be now", REST)]
+    goal: Annotated[Numbers, Field("m, rad", "what was last asked for", REST)]
+    start: Annotated[Numbers, Field("m, rad", "where the move under way began", REST)]
     elapsed: Annotated[float, Field("s", "time into it", 0.0)]
     duration: Annotated[float, Field("s", "its time; 0 if there is none", 0.0)]
 
 
-def standing(x: Array) -> Motion:
+@compiled
+def standing(x: Any) -> Motion:
     """No motion, at a posture (7,)."""
     return Motion(x, x, x, 0.0, 0.0)
 
 
-def follow(motion: Motion, goal: Array, params: ResectionIkParams) -> Motion:
-    """The motion one period later.
+@compiled
+def follow(c: Any, motion: Any, goal: Any) -> Motion:
+    """The motion one period later, its postures arrays.
 
     A goal that moves no faster than the rates allow is met exactly. One that jumps
     starts a move of smooth speed (a quintic, whose peak is 15/8 of its mean) at whose
     end it is met. Both are straight lines in x, which keep the bend's limit if their
     ends do: its cone is convex in (a, b).
     """
-    period, x, start = params.period, motion.x, motion.start
+    x, start = motion.x, motion.start
     elapsed, duration = motion.elapsed, motion.duration
-    if time_between(motion.goal, goal, params) > period * (1 + 1e-9):
+    if time_between(c, motion.goal, goal) > c.period * (1 + 1e-9):
         start, elapsed = x, 0.0
-        duration = 15 / 8 * time_between(x, goal, params)
+        duration = 15 / 8 * time_between(c, x, goal)
     if elapsed < duration:
-        elapsed = min(elapsed + period, duration)
+        elapsed = min(elapsed + c.period, duration)
         r = elapsed / duration
         x = start + r * r * r * (10 - 15 * r + 6 * r * r) * (goal - start)
     else:
-        most = time_between(x, goal, params)
-        x = x + (min(period / most, 1.0) if most > 0.0 else 1.0) * (goal - x)
+        most = time_between(c, x, goal)
+        x = x + (min(c.period / most, 1.0) if most > 0.0 else 1.0) * (goal - x)
     return Motion(x, goal, start, elapsed, duration)
 
 
-class ResectionIk(Block):
+@compiled
+def _step(
+    c: Any, motion: Motion, target: ToolTarget
+) -> tuple[Motion, Posture, IkStatus]:
+    at: Any = np.array(motion.x)
+    goal: Any = np.array(motion.goal)
+    start: Any = np.array(motion.start)
+    now = Motion(at, goal, start, motion.elapsed, motion.duration)
+    status, x = HOLD, np.empty(7)
+    n, m = norm(target.n), norm(target.n_I)
+    if finite_target(target) and n > 0.0 and m > 0.0:
+        axes = np.array(over(target.n, n)), np.array(over(target.n_I, m))
+        travel = c.travel[0], c.travel[1]
+        p, bend = np.array(target.p), c.max_bend
+        status = solve_tool(p, *axes, c.half_pitch, c.tool_offset, bend, travel, x)
+    now = follow(c, now, x) if status == REACHED else standing(now.x)
+    return now, Posture(now.x), IkStatus(float(status))
+
+
+class ResectionIk(StepBlock):
     """Inverse kinematics of the whole robot, tool pose to posture (paper, V.B).
 
     The two redundant freedoms are the intermediate axis, which the target brings
@@ -105,37 +130,24 @@ class ResectionIk(Block):
     ) -> None:
         """Makes the block, starting at a posture (7)."""
         super().__init__()
-        self._params = check(params or ResectionIkParams())
-        self._snake = check(snake or SnakeParams())
-        self._target = self.signal_in("target", ToolTarget)
-        self.DeclareDiscreteState(flat(standing(np.array(posture, float))))
-        self._next = self.cached(
-            "next", self._calc_next, {self.xd_ticket(), self._target.ticket()}
+        params, snake = (
+            check(params or ResectionIkParams()),
+            check(snake or SnakeParams()),
         )
-        ticket = {self._next.ticket()}
-        self.signal_out("posture", Posture, self._calc_posture, ticket)
-        self.signal_out("status", IkStatus, self._calc_status, ticket)
-        self.update_every(self._params.period, self._update)
-
-    def _calc_next(self, context: Any) -> tuple[Motion, int]:
-        """The motion one period later, and the status."""
-        motion = view(Motion, np.array(context.get_discrete_state(0).value()))
-        try:
-            x, status = tool_posture(self._target.Eval(context), self._snake)
-        except ValueError:
-            return standing(motion.x), HOLD
-        if status != REACHED:
-            return standing(motion.x), status
-        return follow(motion, np.array(x), self._params), REACHED
-
-    def _calc_posture(self, context: Any) -> Array:
-        motion, _ = self._next.Eval(context)
-        return motion.x
-
-    def _calc_status(self, context: Any) -> list[float]:
-        _, status = self._next.Eval(context)
-        return [float(status)]
-
-    def _update(self, context: Any) -> Array:
-        motion, _ = self._next.Eval(context)
-        return flat(motion)
+        x = tuple(map(float, posture))
+        constants = packed(
+            params,
+            travel=np.array(snake.travel, float),
+            max_bend=snake.max_bend,
+            half_pitch=snake.half_pitch,
+            tool_offset=snake.tool_offset,
+        )
+        self.declare_step(
+            _step,
+            [constants],
+            {"target": ToolTarget},
+            Motion(x, x, x, 0.0, 0.0),
+            {"posture": Posture, "status": IkStatus},
+            params.period,
+            timed=False,
+        )

@@ -17,6 +17,7 @@ from plants.snake.signals import (
 )
 from plants.snake.snake import FAR, NEAR, NEAR_ANGLES
 from systems.common.block import Block
+from systems.common.compiled import compiled
 from systems.common.parameter import check
 from systems.common.signal import Field, flat, vector, view
 
@@ -45,6 +46,14 @@ class CouplerError(NamedTuple):
     ]
 
 
+@compiled
+def posture_in(state: Any) -> Array:
+    """The posture (7,) in the elements of a `SnakeState`."""
+    x = state[NEAR]
+    x[1:] = (x[1:] + state[FAR]) / 2
+    return x
+
+
 class SnakeLocation(Block):
     """Where the snake truly is.
 
@@ -69,10 +78,7 @@ class SnakeLocation(Block):
         self.signal_out("coupler_error", CouplerError, self._calc_coupler_error, ticket)
 
     def _calc_posture(self, context: Any) -> Array:
-        q = view(SnakeState, self._state.Eval(context)).q
-        x: Array = q[NEAR]
-        x[1:] = (x[1:] + q[FAR]) / 2
-        return x
+        return posture_in(self._state.Eval(context))
 
     def _calc_bends(self, context: Any) -> Array:
         return bends_of(self._posture.Eval(context))

@@ -1,6 +1,5 @@
 """Wire drums: nine motors that wind wires, and the one that slides the robot."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
@@ -10,9 +9,11 @@ from numpy.typing import ArrayLike
 from plants.snake.actuation import length_range, wire_lengths
 from plants.snake.parameters import DRUMS, MODULES, WIRES, SnakeParams
 from plants.snake.signals import REST, DrumRates, Drums, Stopped
-from systems.common.block import Block
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import all_finite
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field
+from systems.common.signal import Field, example
+from systems.common.step_block import StepBlock
 
 
 class Limited(NamedTuple):
@@ -43,7 +44,38 @@ class WireDrumsParams:
     )
 
 
-class WireDrums(Block):
+@compiled
+def wound(start: Any, rates: Any, elapsed: float) -> np.ndarray:
+    """What is wound out some time after an update, (10,)."""
+    return start[:DRUMS] + elapsed * rates
+
+
+@compiled
+def _update(
+    c: Any,
+    start: np.ndarray,
+    rates: DrumRates,
+    limited: Limited,
+    time: float,
+    command: Drums,
+    stop: Stopped,
+) -> tuple[np.ndarray, DrumRates, Limited]:
+    goal, now = np.array((*command.wires, command.s)), np.empty(len(start))
+    elapsed = min(time - start[DRUMS], c.period)
+    now[:DRUMS] = wound(start, np.array((*rates.wires, rates.s)), elapsed)
+    now[DRUMS] = time
+    if stop.flag != 0.0 or not all_finite(goal):
+        still: Any = np.zeros(DRUMS - 1)
+        return now, DrumRates(still, 0.0), Limited(0.0)
+    within = np.minimum(np.maximum(goal, c.low), c.high)
+    step: Any = within - now[:DRUMS]
+    slow = (np.abs(step) / c.most).max()
+    code = 2.0 if (within != goal).any() else 1.0 if slow > 1.0 + 1e-9 else 0.0
+    step /= c.period * max(slow, 1.0)
+    return now, DrumRates(step[: DRUMS - 1], step[DRUMS - 1]), Limited(code)
+
+
+class WireDrums(StepBlock):
     """Position-controlled drums with rate and stroke limits.
 
     A command is reached at the end of the period in which it is given, every motor
@@ -67,44 +99,35 @@ class WireDrums(Block):
     ) -> None:
         """Makes the block, starting at `lengths` (10); straight at s = 0 if None."""
         super().__init__()
-        self._params = check(params or WireDrumsParams())
+        params = check(params or WireDrumsParams())
         snake = check(snake or SnakeParams())
         low, high = length_range(snake)
         s_min, s_max = snake.travel
-        self._low = np.append(low - self._params.margin, s_min)
-        self._high = np.append(high + self._params.margin, s_max)
-        wires = [self._params.wire_rate] * (WIRES * MODULES)
-        self._most = self._params.period * np.array([*wires, self._params.travel_rate])
         if lengths is None:
             lengths = np.append(wire_lengths(REST, snake), 0.0)
-        self._command = self.signal_in("command", Drums)
-        self._stop = self.signal_in("stop", Stopped)
-        # The lengths at the last update, and its instant.
-        self._start = self.DeclareDiscreteState(np.array(lengths, float))
-        self._since = self.DeclareDiscreteState([0.0])
-        self._rates = self.state_out("rates", DrumRates, np.zeros(DRUMS))
-        self.state_out("limited", Limited, np.zeros(1))
+        rates = np.append([params.wire_rate] * (WIRES * MODULES), params.travel_rate)
+        self._period = params.period
+        self.declare_update(
+            _update,
+            [
+                packed(
+                    low=np.append(low - params.margin, s_min),
+                    high=np.append(high + params.margin, s_max),
+                    most=params.period * rates,
+                    period=params.period,
+                )
+            ],
+            {"command": Drums, "stop": Stopped},
+            {
+                "_start": np.append(np.array(lengths, float), 0.0),  # and its instant
+                "rates": example(DrumRates),
+                "limited": example(Limited),
+            },
+            params.period,
+        )
         tickets = {self.xd_ticket(), self.time_ticket()}
         self.signal_out("lengths", Drums, self._calc_lengths, tickets)
-        self.update_every(self._params.period, self._update)
 
     def _calc_lengths(self, context: Any) -> np.ndarray:
-        start, (since,), rates = (
-            context.get_discrete_state(group).value()
-            for group in (self._start, self._since, self._rates)
-        )
-        elapsed = min(context.get_time() - float(since), self._params.period)
-        lengths: np.ndarray = start + elapsed * rates
-        return lengths
-
-    def _update(self, context: Any) -> Sequence[Any]:
-        now, command = self._calc_lengths(context), self._command.Eval(context)
-        since, (stopped,) = [context.get_time()], self._stop.Eval(context)
-        if stopped != 0.0 or not np.isfinite(command).all():
-            return now, since, np.zeros(DRUMS), [0.0]
-        goal = np.minimum(np.maximum(command, self._low), self._high)
-        step = goal - now
-        slow = float((np.abs(step) / self._most).max())
-        limited = 2.0 if (goal != command).any() else 1.0 if slow > 1.0 + 1e-9 else 0.0
-        rates = step / (self._params.period * max(slow, 1.0))
-        return now, since, rates, [limited]
+        start, rates = (context.get_discrete_state(i).value() for i in (0, 1))
+        return wound(start, rates, min(context.get_time() - start[-1], self._period))

@@ -5,7 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.actuation import Angles, angles_of_lengths
+from plants.snake.actuation import Angles, angles, angles_of_lengths, matrices
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import (
@@ -16,9 +16,11 @@ from plants.snake.signals import (
     Numbers,
     Posture,
 )
-from systems.common.block import Block
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import all_finite
 from systems.common.parameter import check
-from systems.common.signal import Field, flat, view
+from systems.common.signal import Field, view
+from systems.common.step_block import StepBlock
 
 
 class Residual(NamedTuple):
@@ -42,7 +44,23 @@ class SetPoint(NamedTuple):
     v: Annotated[Numbers, Field("m/s, rad/s", "their rates, always zero", REST)]
 
 
-class WireForwardActuation(Block):
+@compiled
+def _ahead(
+    c: Any, held: np.ndarray, lengths: Drums, rates: DrumRates
+) -> tuple[SetPoint]:
+    """The posture to be reached: that of the lengths a lead later."""
+    wires, n = np.empty((1, len(lengths.wires))), len(held)
+    wires[0] = np.array(lengths.wires) + c.lead * np.array(rates.wires)
+    ab, off = np.empty((1, n - 1)), np.empty((1, len(c.inverse)))
+    R, e, h = c.ball_radius, c.plate_thickness, c.half_pitch
+    angles(wires, c.rows, c.inverse, R, e, h, ab, off)
+    x: Any = np.empty(n)
+    x[0], x[1:] = lengths.s + c.travel_lead * rates.s, ab[0]
+    good: Any = x if all_finite(x) else held
+    return (SetPoint(good, REST),)
+
+
+class WireForwardActuation(StepBlock):
     """Angles from wire lengths, module after module (paper, IV.B.2 and IV.C).
 
     The plant's springs stand for wires and drums; their set-point is the posture
@@ -76,22 +94,35 @@ class WireForwardActuation(Block):
         super().__init__()
         self._snake = check(snake or SnakeParams())
         drive = check(drive or SnakeDriveParams())
-        self._lead, self._travel_lead = drive.lead + period, drive.travel_lead + period
-        self._lengths = self.signal_in("lengths", Drums)
-        self._rates = self.signal_in("rates", DrumRates)
+        snake = self._snake
+        rows, inverse = matrices(
+            snake.ball_radius, snake.face, tuple(snake.first_azimuths)
+        )
+        constants = packed(
+            rows=rows,
+            inverse=inverse,
+            lead=drive.lead + period,
+            travel_lead=drive.travel_lead + period,
+            ball_radius=snake.ball_radius,
+            plate_thickness=snake.plate_thickness,
+            half_pitch=snake.half_pitch,
+        )
+        last, told = len(REST), {"lengths": Drums, "rates": DrumRates}
+        run, reads = self._runner(
+            _ahead, [constants], [last], told, [SetPoint], False, {}
+        )
         # The last good set-point.
-        self._held = self.DeclareDiscreteState(np.array(posture, float))
+        self.DeclareDiscreteState(np.array(posture, float))
+        ahead = self.cached("ahead", run, reads | {self.xd_ticket()})
+        known = {ahead.ticket()}
+        self.signal_out("desired_state", SetPoint, ahead.Eval, known)
+        self._lengths = self.GetInputPort("lengths")
         ticket = {self._lengths.ticket()}
         self._angles = self.cached("angles", self._calc_angles, ticket)
         now = {*ticket, self._angles.ticket()}
-        both = {*ticket, self._rates.ticket(), self.xd_ticket()}
-        self._ahead = self.cached("ahead", self._calc_ahead, both)
         self.signal_out("posture", Posture, self._calc_posture, now)
         self.signal_out("residual", Residual, self._calc_residual, now)
-        self.signal_out(
-            "desired_state", SetPoint, self._calc_desired_state, {self._ahead.ticket()}
-        )
-        self.update_every(period, self._ahead.Eval)
+        self.update_every(period, lambda context: ahead.Eval(context)[:last])
 
     def _calc_angles(self, context: Any) -> Angles:
         wires = view(Drums, self._lengths.Eval(context)).wires
@@ -104,17 +135,3 @@ class WireForwardActuation(Block):
     def _calc_residual(self, context: Any) -> np.ndarray:
         residual: np.ndarray = self._angles.Eval(context).residual
         return residual
-
-    def _calc_ahead(self, context: Any) -> np.ndarray:
-        """The posture (7) to be reached: that of the lengths a lead later."""
-        drums = view(Drums, self._lengths.Eval(context))
-        rates = view(DrumRates, self._rates.Eval(context))
-        wires = drums.wires + self._lead * rates.wires
-        s = drums.s + self._travel_lead * rates.s
-        x = np.append(s, angles_of_lengths(wires, self._snake).ab)
-        if np.isfinite(x).all():
-            return x
-        return np.array(context.get_discrete_state(self._held).value())
-
-    def _calc_desired_state(self, context: Any) -> np.ndarray:
-        return flat(SetPoint(self._ahead.Eval(context), REST))

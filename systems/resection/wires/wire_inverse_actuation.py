@@ -1,19 +1,22 @@
 """Wire inverse actuation: the drums' positions for a posture."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.actuation import wire_lengths
+from plants.snake.actuation import lengths, norm_rows, wire_lengths
 from plants.snake.core import SnakeCoreParams, torques_against_core
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import REST, Drums, Posture
 from plants.snake.tension import tensions
-from plants.snake.weight import GRAVITY, weight
+from plants.snake.weight import GRAVITY, torques_of_weight, weight, whole_mass
 from systems.common.block import Block
+from systems.common.compiled import compiled, packed
+from systems.common.geometry import all_finite
 from systems.common.parameter import check, parameter
 
 PAPERS = SnakeCoreParams(kind="coupled")
@@ -46,6 +49,55 @@ class WireInverseActuationParams:
     )
 
 
+@compiled
+def _wound(constants: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Drum positions of wires that do not stretch."""
+    c, lifted = constants[0], np.empty((1, len(x)))
+    lifted[0, 0] = x[0] - c.load / c.travel_kp
+    h, g = c.half_pitch, c.gravity
+    masses = (c.ball_mass, c.plate_mass, c.tool_mass)
+    lifted[0, 1:] = x[1:] - torques_of_weight(x, h, c.tool_offset, *masses, g) / c.kp
+    n = len(c.rows)
+    L, wound = np.empty((1, n)), np.empty(n + 1)
+    lengths(lifted, c.rows, c.ball_radius, c.plate_thickness, h, L)
+    wound[:n], wound[n] = L[0], lifted[0, 0]
+    return wound
+
+
+def winding(
+    params: WireInverseActuationParams,
+    snake: SnakeParams,
+    drive: SnakeDriveParams,
+    core: SnakeCoreParams = PAPERS,
+) -> Callable[[np.ndarray], np.ndarray]:
+    """The map of a posture x (7) to drums (10): wires 0 to 8 and the translation [m].
+
+    They hold the snake's weight as well, and bend its core: what gives way under it,
+    wires or servos, is wound shorter by as much.
+    """
+    if params.stiffness == 0.0:
+        c = packed(
+            drive,
+            rows=norm_rows(snake),
+            load=whole_mass(drive) * params.gravity[2],
+            gravity=np.array(params.gravity, float),
+            half_pitch=snake.half_pitch,
+            tool_offset=snake.tool_offset,
+            ball_radius=snake.ball_radius,
+            plate_thickness=snake.plate_thickness,
+        )
+        return lambda x: _wound(c, x)
+
+    def stretched(x: np.ndarray) -> np.ndarray:
+        load = weight(x, snake, drive, params.gravity)
+        tau = torques_against_core(x[1:], core) - load[1:]
+        T = tensions(x[1:], tau, snake, params.least_tension)
+        s = x[0] - load[0] / drive.travel_kp
+        return np.append(wire_lengths(x, snake) - T / params.stiffness, s)
+
+    return stretched
+
+
 def wound_lengths(
     x: ArrayLike,
     params: WireInverseActuationParams,
@@ -53,20 +105,8 @@ def wound_lengths(
     drive: SnakeDriveParams,
     core: SnakeCoreParams = PAPERS,
 ) -> np.ndarray:
-    """Drum positions of a posture x (7): wires 0 to 8 and the translation [m] (10).
-
-    They hold the snake's weight as well, and bend its core: what gives way under it,
-    wires or servos, is wound shorter by as much.
-    """
-    x = np.asarray(x, float)
-    load = weight(x, snake, drive, params.gravity)
-    stiffness = np.array([drive.travel_kp] + [drive.kp] * (len(x) - 1))
-    lifted = x - load / stiffness
-    if params.stiffness > 0.0:
-        tau = torques_against_core(x[1:], core) - load[1:]
-        T = tensions(x[1:], tau, snake, params.least_tension)
-        return np.append(wire_lengths(x, snake) - T / params.stiffness, lifted[0])
-    return np.append(wire_lengths(lifted, snake), lifted[0])
+    """Drum positions of a posture x (7), see `winding`."""
+    return winding(params, snake, drive, core)(np.asarray(x, float))
 
 
 class WireInverseActuation(Block):
@@ -89,22 +129,19 @@ class WireInverseActuation(Block):
     ) -> None:
         """Makes the block for a snake, its drive and core, starting at a posture."""
         super().__init__()
-        self._params = check(params or WireInverseActuationParams())
-        self._snake = check(snake or SnakeParams())
-        self._drive = check(drive or SnakeDriveParams())
-        self._core = core
+        params = check(params or WireInverseActuationParams())
+        snake, drive = check(snake or SnakeParams()), check(drive or SnakeDriveParams())
+        self._wound = winding(params, snake, drive, core)
         self._posture = self.signal_in("posture", Posture)
-        self.DeclareDiscreteState(self._wound(posture))  # the last good drums
+        # The last good drums.
+        self.DeclareDiscreteState(self._wound(np.array(posture, float)))
         tickets = {self._posture.ticket(), self.xd_ticket()}
         self._drums = self.cached("drums", self._calc_drums, tickets)
         self.signal_out("drums", Drums, self._drums.Eval, {self._drums.ticket()})
-        self.update_every(self._params.period, self._drums.Eval)
-
-    def _wound(self, x: ArrayLike) -> np.ndarray:
-        return wound_lengths(x, self._params, self._snake, self._drive, self._core)
+        self.update_every(params.period, self._drums.Eval)
 
     def _calc_drums(self, context: Any) -> np.ndarray:
         x = self._posture.Eval(context)
-        if np.isfinite(x).all():
+        if all_finite(x):
             return self._wound(x)
         return np.array(context.get_discrete_state(0).value())

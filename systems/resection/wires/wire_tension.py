@@ -5,13 +5,15 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.parameters import MODULES, SnakeParams
+from plants.snake.actuation import norm_rows
+from plants.snake.parameters import MODULES, WIRES, SnakeParams
 from plants.snake.signals import Numbers, SnakeState, Tensions
 from plants.snake.snake import NEAR_ANGLES
-from plants.snake.tension import tensions
-from systems.common.block import Block
+from plants.snake.tension import tensions_of
+from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, view
+from systems.common.signal import Field
+from systems.common.step_block import StepBlock
 
 
 class NetActuation(NamedTuple):
@@ -32,7 +34,16 @@ class WireTensionParams:
     )
 
 
-class WireTension(Block):
+@compiled
+def _tension(c: Any, state: SnakeState, actuation: NetActuation) -> tuple[Tensions]:
+    T: Any = np.empty(WIRES * MODULES)
+    ab, tau = np.array(state.q)[NEAR_ANGLES], np.array(actuation.tau)
+    R, h, e = c.ball_radius, c.half_pitch, c.plate_thickness
+    tensions_of(ab, tau, c.rows, R, h, e, c.least, T)
+    return (Tensions(T),)
+
+
+class WireTension(StepBlock):
     """Wire tensions behind the plant's net actuation, none below a minimum.
 
     A module's three wires give its two torques and one pretension. (In Drake 1.58
@@ -49,14 +60,18 @@ class WireTension(Block):
     ) -> None:
         """Makes the block."""
         super().__init__()
-        self._params = check(params or WireTensionParams())
-        self._snake = check(snake or SnakeParams())
-        self._state = self.signal_in("state", SnakeState)
-        self._actuation = self.signal_in("net_actuation", NetActuation)
-        tickets = {self._state.ticket(), self._actuation.ticket()}
-        self.signal_out("tension", Tensions, self._calc_tension, tickets)
-
-    def _calc_tension(self, context: Any) -> np.ndarray:
-        ab = view(SnakeState, self._state.Eval(context)).q[NEAR_ANGLES]
-        tau = view(NetActuation, self._actuation.Eval(context)).tau
-        return tensions(ab, tau, self._snake, self._params.least)
+        snake = check(snake or SnakeParams())
+        constants = packed(
+            check(params or WireTensionParams()),
+            rows=norm_rows(snake),
+            ball_radius=snake.ball_radius,
+            half_pitch=snake.half_pitch,
+            plate_thickness=snake.plate_thickness,
+        )
+        self.declare_map(
+            _tension,
+            [constants],
+            {"state": SnakeState, "net_actuation": NetActuation},
+            "tension",
+            Tensions,
+        )

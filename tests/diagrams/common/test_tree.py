@@ -8,7 +8,7 @@ import pytest
 
 from diagrams.common.results import results, save_scenario
 from diagrams.common.scenario import Scenario, ScenarioError
-from diagrams.common.tree import apply_override, fit, read_tree, read_yaml
+from diagrams.common.tree import apply_override, fit, make, read_tree, read_yaml
 from diagrams.studies import load_scenario
 
 
@@ -31,6 +31,18 @@ class Toy(Scenario):
 
     part: Part = field(default_factory=Part)
     parts: list[Part] = field(default_factory=list)
+
+
+@dataclass
+class Stiff(Scenario):
+    """A scenario whose part has a default of its own."""
+
+    part: Part = field(default_factory=lambda: Part(stiffness=7.0, steps=5))
+
+
+def test_what_is_not_told_of_a_part_is_as_the_scenario_has_it():
+    made = make(Stiff, {"part": {"steps": 2}})
+    assert (made.part.stiffness, made.part.steps) == (7.0, 2)
 
 
 def fitted(text: str):

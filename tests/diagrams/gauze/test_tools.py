@@ -68,6 +68,7 @@ def test_tremors_differ_and_do_not_meet_another_seed():
         ("obstacle.points=[[0, 0]]", r"obstacle.points=.*expected"),
         ("tools=[{role: obstacle}]", r"tools.*with a name"),
         ("tools=[{name: x, role: hand}]", r"role='hand'"),
+        ("camera.role=[]", r"role=\[\]: choose from"),
         ("tools=[{name: s, role: target, p_WG: [0.2, 0.2, 0]}]", r"'target'.*one"),
         ("obstacle.p_WG=[0.0, 0.0, 0.0]", r"robot.p_WG=.*obstacle.p_WG="),
         ("obstacle=3", r"obstacle=3: expected keys"),

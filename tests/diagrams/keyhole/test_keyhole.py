@@ -133,6 +133,14 @@ def test_replay_holds_the_organ():
         ("tube_task.standoff=0.03", "standoff >= instrument.gap"),
         ("joints.period=0.01", "share their instants"),
         ("organ_motion.recording=nowhere.csv", "nowhere.csv"),
+        (
+            "task=resect organ_motion.lag=0.5",
+            "operation.clearance=0.00015 m: wall and organ tilt the tube by .* deg",
+        ),
+        (
+            "task=resect operation.clearance=5e-05",
+            "phases.deviation=0.00015 m: expected <= operation.clearance=5e-05",
+        ),
     ],
 )
 def test_bad_input(override, message):

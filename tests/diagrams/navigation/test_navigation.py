@@ -9,14 +9,20 @@ from diagrams.common.plots import png
 from diagrams.common.run import Run, run_scenario, simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.navigation.figures import thesis_figures
+from diagrams.navigation.perceived import grids
 from diagrams.navigation.plots import plots
 from diagrams.navigation.scenario import outruns
 from diagrams.studies import load_scenario
+from plants.crowd.signals import CAPACITY
 from plants.turtlebot.turtlebot import RobotState
+from systems.perception.grid import OCCUPIED
 from systems.switching.switching_state import MODES
 from tests.runs import run
 
-NAMES = ("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd")
+NAMES = (
+    *("one_static", "one_moving", "local_minimum", "three_moving", "u_trap", "crowd"),
+    *("lidar_crowd", "corner", "corridor", "recorded"),
+)
 KEYS = {
     *("reached", "collided", "time_to_target", "min_clearance", "path_ratio"),
     *("planner_step_median", "mode_switches", "real_time_factor"),
@@ -124,6 +130,56 @@ def test_bad_input_is_refused(overrides, message):
         load_scenario("nav_one_static", overrides)
 
 
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            ["start=[0.0, 1.05]"],
+            r"start=.* lies in a wall .*: 0.05 m .* 0.171",
+        ),
+        (["goal=[8.0, -1.0]"], r"goal=.* lies in a wall as the robot sees it: 0.1 m"),
+        (["goal=[30.0, 0.0]", "mapping.x=4"], r"goal=.*: beyond the grid, 20 m wide"),
+        (
+            ["walls=[{solid: true, points: [[5, 5], [6, 5], [6, 6], [5, 6]]}]"],
+            r"walls\[0\].points=.*: expected an outline .*; it is 1 m",
+        ),
+        (["senses=given"], r"walls: expected senses=lidar"),
+        (["robot.model=turtlebot5"], r"robot.model='turtlebot5': expected one of"),
+        (["recording=nobody.txt"], r"recording"),
+    ],
+)
+def test_bad_worlds_of_walls_are_refused(overrides, message):
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("nav_corner", overrides)
+
+
+def test_corners_are_passed_slower_than_if_nobody_could_step_out():
+    careful = run("nav_corner")
+    careless = run("nav_corner", "switching.unseen_speed=0", "duration=8")
+    least = []
+    for r in (careful, careless):
+        robot = r.robot.state
+        least.append(robot.v[(robot.x > 1.0) & (robot.x < 3.0)].min())
+    assert least[0] < 0.8 * least[1]
+
+
+def test_what_the_robot_believes_is_near_what_is_true():
+    for name in ("lidar_crowd", "corner", "recorded"):
+        figures = run(f"nav_{name}").metrics
+        assert figures["goal_miss"] < 0.2 and figures["max_place_error"] < 0.1
+        assert figures["place_within_3_sigma"] > 0.95
+        assert figures["walkers_tracked"] > 0.8
+        assert figures["median_track_error"] < 0.06
+    r = run("nav_corner")
+    *_, (last, grid) = grids(r)
+    assert last == pytest.approx(30.0)
+    # The wall is in the grid where it is in the world, also where it is out of sight.
+    stands = grid.odds >= OCCUPIED
+    below = stands & (np.abs(grid.y + 1.1) < 0.1) & (grid.x > 0.0) & (grid.x < 8.0)
+    assert below.sum() > 30
+    png(plots(r)["perception"])
+
+
 def test_negative_radius_is_refused():
     scenario = load_scenario("nav_three_moving")
     scenario.obstacles[2].radius = -0.5
@@ -145,7 +201,7 @@ def test_signals_have_the_names_of_their_declarations():
     assert list(r.signals)[1:6] == [f"robot.state.{n}" for n in RobotState._fields]
     assert list(r.signals)[6] == "obstacles.rows.x_0"
     obstacles, robot = r.obstacles.rows, r.robot.state
-    assert obstacles.x.shape == (*robot.x.shape, 24)
+    assert obstacles.x.shape == (*robot.x.shape, CAPACITY)
     np.testing.assert_array_equal(obstacles.radius[:, 0], 0.5)
     np.testing.assert_array_equal(robot.theta, r.signals["robot.state.theta"])
 

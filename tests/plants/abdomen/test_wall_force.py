@@ -25,7 +25,7 @@ def test_shaft_through_the_fulcrum_feels_nothing():
 
 
 def test_ports_are_documented_and_read_the_plant(make_scene):
-    for name in ("body_poses", "body_spatial_velocities", "force", "fulcrum_error"):
+    for name in ("state", "force", "fulcrum_error"):
         assert f"``{name}``" in WallForce.__doc__
     scene = make_scene()
     np.testing.assert_allclose(scene.output(scene.wall_force, "force"), 0.0, atol=1e-6)

@@ -25,7 +25,7 @@ from pydrake.systems.primitives import (
 from pydrake.trajectories import PiecewisePolynomial
 import pytest
 
-from plants.arm.arm import ArmParams, SetPoint, add_arm
+from plants.arm.arm import ArmParams, SetPoint, add_arm, servo_step
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import (
     FRICTION,
@@ -245,6 +245,32 @@ def test_set_point_is_position_lead_and_feed_forward():
     # The servo's torque then is friction plus the feed-forward, for a motion on time.
     torque = kp * (sent[:7] - 0.01 * v - q) - kd * v
     np.testing.assert_allclose(torque, FRICTION * v + tau)
+
+
+def test_what_is_left_of_a_lag_after_a_period():
+    """The arm alone from a lag, moving, and told to go on: one step of CENIC."""
+    period, params = 1 / 60, ArmParams()
+    builder = DiagramBuilder()
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 0.0)
+    arm = add_arm(plant)
+    plant.Finalize()
+    rng = np.random.default_rng(1)
+    q_d = np.array(READY_POSTURE)
+    lag, d, v = rng.normal(size=(3, 7)) * np.array([[1e-4], [1e-3], [0.05]])
+    simulator = Simulator(builder.Build())
+    config = SimulatorConfig(integration_scheme="cenic", max_step_size=period)
+    config.use_error_control, config.accuracy = False, 1e-4
+    ApplySimulatorConfig(config, simulator)
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    sent = SetPoint(params, period)(q_d, d / period)
+    plant.get_desired_state_input_port(arm).FixValue(context, sent)
+    plant.SetPositionsAndVelocities(context, [*(q_d + lag), *v])
+    simulator.AdvanceTo(period)
+    left = plant.GetPositions(context) - (q_d + d)
+    A, C = servo_step(arm_alone()[0], q_d, params, period)
+    told = A @ lag + C @ (v * period - d)
+    assert np.abs(left - told).max() < 0.02 * np.abs(left).max()
+    assert np.abs(left - lag).max() > 0.3 * np.abs(left).max()
 
 
 def test_set_point_takes_less_than_ten_microseconds():

@@ -1,6 +1,6 @@
 """Obstacles' motion, and the crowd."""
 
-from math import nan
+from math import hypot, nan
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -10,6 +10,7 @@ from plants.crowd.crowd_motion import CrowdMotion, CrowdParams, starts
 from plants.crowd.obstacle_motion import ObstacleMotion, ObstacleParams, obstacle_at
 from plants.crowd.orca import orca_towards, orca_velocity
 from plants.crowd.signals import OBSTACLES, Obstacle
+from plants.crowd.social_force import social_force_towards
 from systems.common.signal import view
 
 
@@ -68,10 +69,10 @@ def test_bad_obstacles_are_refused(change, message):
 def test_a_world_may_be_empty_or_full_but_no_more():
     dut = ObstacleMotion([])
     rows = view(OBSTACLES, dut.GetOutputPort("obstacles").Eval(dut.AllocateContext()))
-    assert len(rows.radius) == 24 and not rows.radius.any()
+    assert len(rows.radius) == 40 and not rows.radius.any()
     assert len(ObstacleMotion().obstacles) == 1
-    with pytest.raises(ValueError, match="obstacles: 25 of them: expected <= 24"):
-        ObstacleMotion([ObstacleParams()] * 25)
+    with pytest.raises(ValueError, match="obstacles: 41 of them: expected <= 40"):
+        ObstacleMotion([ObstacleParams()] * 41)
 
 
 def test_two_who_meet_give_way_to_each_other():
@@ -124,7 +125,7 @@ def test_the_block_walks_as_the_crowd_does():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"people": 100}, r"crowd.people=100: expected >= 0 and <= 24"),
+        ({"people": 100}, r"crowd.people=100: expected >= 0 and <= 40"),
         ({"people": 24, "radius": 0.6}, "crowd.people=24: expected <= 14: no more fit"),
         ({"people": -1}, r"crowd.people=-1: expected >= 0"),
         ({"speed": 0.0}, r"crowd.speed=0.0 m/s: expected > 0"),
@@ -134,3 +135,37 @@ def test_the_block_walks_as_the_crowd_does():
 def test_a_crowd_that_cannot_be_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
         CrowdMotion(CrowdParams(**change))
+
+
+def test_people_of_the_social_force_meet_without_touching_and_arrive():
+    people = [Obstacle(-2.0, 0.0, 0.3, 0.0, 0.0), Obstacle(2.0, 0.05, 0.3, 0.0, 0.0)]
+    goals, least = [(2.0, 0.0), (-2.0, 0.05)], np.inf
+    for _ in range(120):
+        moves = social_force_towards(people, goals, 0.6, 0.1)
+        people = [
+            o._replace(x=o.x + 0.1 * u, y=o.y + 0.1 * v, v_x=u, v_y=v)
+            for o, (u, v) in zip(people, moves, strict=True)
+        ]
+        assert max(hypot(u, v) for u, v in moves) <= 0.78 + 1e-9
+        least = min(least, hypot(people[0].x - people[1].x, people[0].y - people[1].y))
+    assert least > 0.6
+    for person, goal in zip(people, goals, strict=True):
+        assert hypot(person.x - goal[0], person.y - goal[1]) < 0.2
+
+
+@pytest.mark.parametrize("model", ["orca", "social_force"])
+def test_who_sees_the_robot_goes_round_it(model):
+    gaps = {}
+    for sees in (False, True):
+        dut = CrowdMotion(CrowdParams(people=6, model=model, sees_robot=sees))
+        context = dut.CreateDefaultContext()
+        dut.GetInputPort("robot").FixValue(context, [0.0, 0.0, 0.0, 0.0, 0.0])
+        simulator = Simulator(dut, context)
+        gaps[sees] = np.inf
+        for time in np.arange(0.0, 20.0, 0.25):
+            simulator.AdvanceTo(time)
+            rows = view(OBSTACLES, dut.GetOutputPort("obstacles").Eval(context))
+            there = rows.radius > 0.0
+            gap = (np.hypot(rows.x, rows.y) - rows.radius - 0.18)[there]
+            gaps[sees] = min(gaps[sees], gap.min())
+    assert gaps[False] < 0.0 < gaps[True]

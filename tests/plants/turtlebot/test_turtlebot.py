@@ -11,11 +11,13 @@ from pydrake.systems.analysis import (
 import pytest
 
 from plants.turtlebot.turtlebot import (
+    BODIES,
     Command,
     RobotState,
     TurtlebotParams,
     make_turtlebot,
 )
+from systems.common.parameter import check
 
 
 def drive(speed, rate, duration, start=(1.0, 2.0, 0.5)):
@@ -70,3 +72,10 @@ def test_the_shortest_lag_is_stable_at_the_step_of_the_navigation():
     simulator.AdvanceTo(3.0)
     state = RobotState(*robot.get_output_port().Eval(simulator.get_context()))
     assert (state.v, state.omega) == pytest.approx((0.4, 0.3), abs=0.01)
+
+
+def test_a_model_gives_the_numbers_that_nobody_gave():
+    body = TurtlebotParams(model="turtlebot4", lag=0.1, speed=0.3)
+    assert (body.radius, body.speed, body.lag) == (0.171, 0.3, 0.1)
+    for name in BODIES:
+        check(TurtlebotParams(name))

@@ -15,7 +15,7 @@ from systems.keyhole.phases import (
     Reason,
     step,
 )
-from systems.keyhole.signals import SnakeStatus, TubeStatus
+from systems.keyhole.signals import BodyDeviation, SnakeStatus, TubeStatus
 from systems.resection.wires.wire_watch import Alarm
 from systems.sensing.organ_estimator import OrganMotion
 
@@ -30,6 +30,7 @@ GOOD = {
     "wrench": example(Wrench)._replace(f=(0.0, 0.0, 0.0)),
     "permission": Permission(1.0, 0.0),
     "alarm": Alarm(-1.0, -1.0),
+    "deviation": BodyDeviation(2e-5),
 }
 ORGAN = GOOD["organ"]
 BAD = {
@@ -38,6 +39,7 @@ BAD = {
     "wrist frozen": ({"permission": Permission(0.0, 8.0)}, Reason.SENSOR),
     "wire slack": ({"alarm": Alarm(1.0, 2.0)}, Reason.WIRE),
     "tube away": ({"tube": TubeStatus(0.02, 0.0)}, Reason.AWAY),
+    "tube tilted": ({"deviation": BodyDeviation(3e-4)}, Reason.TILTED),
     "no number": ({"tube": TubeStatus(np.nan, 0.0)}, Reason.NUMBERS),
 }
 HINDERED = {

@@ -5,6 +5,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 import pytest
 
+from plants.arm.arm import servo_step
 from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.parameters import READY_POSTURE
 from plants.instruments.tube import TubeParams
@@ -12,12 +13,13 @@ from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolTarget
 from plants.snake.snake import add_snake
-from systems.common.signal import example, flat, view
+from systems.common.geometry import Pose
+from systems.common.signal import example, flat, vector, view
 from systems.common.signals import ToolMotion
 from systems.keyhole.phases import Phases
 from systems.keyhole.signals import Phase, SnakeStatus, TubePose, TubeStatus
 from systems.keyhole.snake_load import weight_of
-from systems.keyhole.snake_task import SnakeTask, in_channel
+from systems.keyhole.snake_task import SnakeTask, body_deviation, in_channel
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask, TubeTaskParams
 from systems.sensing.organ_estimator import OrganMotion
@@ -30,14 +32,15 @@ def test_tube_pose_is_the_plants():
     context = plant.CreateDefaultContext()
     dut = TubeLocation(tube)
     own = dut.CreateDefaultContext()
+    A, C = servo_step(plant, READY_POSTURE, None, 1 / 120)
     for _ in range(5):
-        q = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
-        lag, step = rng.uniform(-0.01, 0.01, (2, 7))
-        dut.GetInputPort("arm_state").FixValue(own, np.append(q, np.zeros(7)))
-        dut.GetInputPort("posture").FixValue(own, q + lag)
-        dut.GetInputPort("next").FixValue(own, q + lag + step)
+        q_d = np.array(READY_POSTURE) + rng.uniform(-0.4, 0.4, 7)
+        lag, step, v = rng.uniform(-0.01, 0.01, (3, 7))
+        dut.GetInputPort("arm_state").FixValue(own, [*(q_d + lag), *v])
+        dut.GetInputPort("posture").FixValue(own, q_d)
+        dut.GetInputPort("next").FixValue(own, q_d + step)
         seen = view(TubePose, np.array(dut.GetOutputPort("tube").Eval(own)))
-        plant.SetPositions(context, q + step)
+        plant.SetPositions(context, q_d + step + A @ lag + C @ (v / 120 - step))
         X = plant.GetFrameByName(INSTRUMENT_TIP).CalcPoseInWorld(context)
         np.testing.assert_allclose(seen.p, X.translation(), atol=1e-12)
         np.testing.assert_allclose(seen.x, X.rotation().col(0), atol=1e-12)
@@ -62,12 +65,13 @@ def test_a_target_in_the_organ_is_one_in_the_channel():
         A, B = (np.linalg.qr(rng.normal(size=(3, 3)))[0] for _ in range(2))
         R_WE, R_WC = (R * np.sign(np.linalg.det(R)) for R in (A, B))
         p_WE, p_WP, p_E = rng.normal(size=(3, 3))
-        tube = flat(TubePose(p_WP, R_WC[:, 0], R_WC[:, 2]))
-        target = flat(ToolTarget(p_E, *np.eye(3)[:2]))
-        out = in_channel(target, R_WE.T[::2].copy(), p_WE, tube, 0.04)
+        tube = TubePose(*map(vector, (p_WP, R_WC[:, 0], R_WC[:, 2])))
+        target = ToolTarget(vector(p_E), *map(vector, np.eye(3)[:2]))
+        E = Pose(*map(vector, (p_WE, *R_WE.T)))
+        out = in_channel(target, E, tube, 0.04)
         p_WC = p_WP + 0.04 * R_WC[:, 2]
-        np.testing.assert_allclose(p_WC + R_WC @ out[:3], p_WE + R_WE @ p_E, atol=1e-12)
-        np.testing.assert_allclose(R_WC @ out[3:6], R_WE[:, 0], atol=1e-12)
+        np.testing.assert_allclose(p_WC + R_WC @ out.p, p_WE + R_WE @ p_E, atol=1e-12)
+        np.testing.assert_allclose(R_WC @ out.n, R_WE[:, 0], atol=1e-12)
 
 
 class Played:
@@ -111,6 +115,20 @@ def test_the_snake_makes_up_for_the_tube():
     _, after = played.play(Phases.RESECT, 1e-9)
     # C's z axis is the world's -z, its y axis the world's -y.
     np.testing.assert_allclose(after.p - before.p, [0.002, 0.001, -0.003], atol=2e-4)
+
+
+def test_the_body_leaves_its_plan_as_the_tube_does():
+    """Some 0.04 mm a degree, and a third of how far it stands aside."""
+    x = np.array([-0.01, 0.2, -0.3, 0.3, 0.2, 0.4, -0.1])
+    E = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    snake = SnakeParams()
+    geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
+    assert body_deviation(x, E, E, *geometry) < 1e-12
+    c, s = np.cos(np.radians(1.0)), np.sin(np.radians(1.0))
+    tilted = Pose((0.0, 0.0, 0.0), (c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c))
+    assert 2e-5 < body_deviation(x, tilted, E, *geometry) < 6e-5
+    aside = E._replace(p=(5e-4, 0.0, 0.0))
+    assert 1e-4 < body_deviation(x, aside, E, *geometry) < 2e-4
 
 
 def test_a_stop_draws_the_tool_back():

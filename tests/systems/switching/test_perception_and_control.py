@@ -5,7 +5,7 @@ from math import hypot, inf, nan, pi
 import numpy as np
 import pytest
 
-from plants.crowd.signals import Obstacle
+from plants.crowd.signals import CAPACITY, Obstacle
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import packed
 from systems.common.signal import example, flat
@@ -27,6 +27,7 @@ from systems.switching.unicycle_control import (
 from systems.switching.unicycle_control import heading_law as compiled_law
 from tests.loosely import loosely
 
+ROWS = len(SEEN.names)
 ROBOT = RobotState(0.0, 0.0, 0.0, 0.0, 0.0)
 QUIET = Noise(0.0, 0.0, 0.0, 0.0)
 
@@ -52,11 +53,11 @@ def test_perception_sees_within_its_disc_and_adds_noise():
         Obstacle(1.0, 1.0, 0.0, 0.0, 0.0),
     ]
     noise = [Noise(1.0, -1.0, 2.0, 0.0), QUIET, QUIET]
-    near, far, nothing = seen_of(params, obstacles, noise)
+    near, far, nothing, *_ = seen_of(params, obstacles, noise)
     assert near == pytest.approx(Seen(0.0, 2.02, -0.02, 0.3, 0.2, 0.0))
     assert far.track == -1.0 and nothing.track == -1.0
     # What is not known in numbers is not overlooked.
-    (lost,) = seen_of(params, [Obstacle(nan, 0.0, 0.3, 0.0, 0.0)], [QUIET])
+    lost, *_ = seen_of(params, [Obstacle(nan, 0.0, 0.3, 0.0, 0.0)], [QUIET])
     assert lost.track == 0.0 and np.isnan(lost.x)
 
 
@@ -64,11 +65,11 @@ def test_perception_as_a_block():
     dut = Perception(PerceptionParams(vision=1.0))
     context = dut.CreateDefaultContext()
     dut.GetInputPort("robot").FixValue(context, flat(ROBOT))
-    rows = np.zeros((24, 5))
+    rows = np.zeros((CAPACITY, 5))
     rows[3], rows[7] = (0.5, 0.0, 0.3, 0.0, 0.1), (9.0, 0.0, 0.3, 0.0, 0.0)
     dut.GetInputPort("obstacles").FixValue(context, rows.ravel())
     dut.GetInputPort("noise").FixValue(context, flat(example(NOISE)))
-    seen = dut.GetOutputPort("seen").Eval(context).reshape(24, 6)
+    seen = dut.GetOutputPort("seen").Eval(context).reshape(-1, 6)
     assert seen[3].tolist() == [3.0, 0.5, 0.0, 0.3, 0.0, 0.1]
     assert (np.delete(seen, 3, 0)[:, 0] == -1.0).all()
 
@@ -129,7 +130,7 @@ def test_bad_control_is_refused():
 def test_a_broken_input_stops_the_robot(planner, name, broken):
     dut = planner()
     context = dut.CreateDefaultContext()
-    inputs = {"robot": ROBOT, "goal": (8.0, 0.0), "seen": [(-1.0, *[0.0] * 5)] * 24}
+    inputs = {"robot": ROBOT, "goal": (8.0, 0.0), "seen": [(-1.0, *[0.0] * 5)] * ROWS}
     for port, value in inputs.items():
         dut.GetInputPort(port).FixValue(context, np.ravel(value))
 
@@ -153,7 +154,7 @@ def test_what_is_not_seen_does_not_matter():
     context = dut.CreateDefaultContext()
     dut.GetInputPort("robot").FixValue(context, flat(ROBOT))
     dut.GetInputPort("goal").FixValue(context, [8.0, 0.0])
-    seen = np.tile([-1.0, 0.6, 0.1, 0.3, 0.0, 0.0], 24)
+    seen = np.tile([-1.0, 0.6, 0.1, 0.3, 0.0, 0.0], ROWS)
     dut.GetInputPort("seen").FixValue(context, seen)
     context.SetDiscreteState(dut.EvalUniquePeriodicDiscreteUpdate(context))
     assert dut.GetOutputPort("v_R").Eval(context).tolist() == [0.5, 0.0]

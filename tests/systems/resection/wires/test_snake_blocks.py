@@ -14,6 +14,7 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.snake import FAR, NEAR, POSITIONS
 from plants.snake.weight import weight
+from systems.common.compiled import packed
 from systems.common.parameter import check
 from systems.resection.wires.resection_ik import (
     HOLD,
@@ -94,13 +95,13 @@ def test_resection_ik_approaches_a_far_target_smoothly_and_meets_it():
 
 def test_a_slow_goal_is_met_exactly():
     params = ResectionIkParams()
-    motion = standing(np.zeros(7))
+    motion, c = standing(np.zeros(7)), packed(params)[0]
     for k in range(1, 50):
         goal = np.array([0.0, *[0.5 * params.bend_rate * params.period * k] * 6])
-        motion = follow(motion, goal, params)
+        motion = follow(c, motion, goal)
         np.testing.assert_allclose(motion.x, goal, atol=1e-15)
     shift = np.array([params.travel_rate, *[0.0] * 6])
-    assert time_between(motion.x, motion.x + shift, params) == pytest.approx(1.0)
+    assert time_between(c, motion.x, motion.x + shift) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,1 @@
+"""Organs: their surfaces, the distance to them, how they move, yield and look."""

@@ -1,0 +1,178 @@
+"""The occupancy grid: what rays hit and what they pass, cell by cell.
+
+A cell holds the logarithm of the odds that something stands in it, and the mean of
+the points that were hit there: what stands is known to a centimetre, not to a cell.
+What walks is left out. A cell is forgotten only if rays pass through its mean.
+"""
+
+from math import cos, floor, hypot, sin
+from typing import Any
+
+import numpy as np
+
+from plants.turtlebot.lidar import RAYS, STEP
+from plants.turtlebot.turtlebot import RobotState
+from systems.common.compiled import compiled
+from systems.perception.signals import CELLS
+from systems.switching.signals import STANDING
+
+HIT, MISS = 0.9, -1.2
+"""What a scan adds to the logarithm of the odds."""
+LEAST, MOST = -4.0, 27.0
+OCCUPIED = 1.7
+"""Two hits more than passes: something stands there."""
+SETTLED = 4.0
+"""Five hits: nothing new."""
+RELIABLE = 18.0
+"""Twenty hits: so long has it stood that the robot finds its place by it."""
+NEAR = 1.5
+"""Within this distance [m] every point matters, beyond it one of four cells."""
+
+
+@compiled
+def cell_of(params: Any, x: float, y: float) -> int:
+    """Index of the cell at a place; -1 beyond the grid."""
+    i = floor((x - params.left) / params.cell)
+    j = floor((y - params.bottom) / params.cell)
+    return i * CELLS + j if 0 <= i < CELLS and 0 <= j < CELLS else -1
+
+
+@compiled
+def walks(moving: np.ndarray, x: float, y: float, spare: float) -> bool:
+    """Whether a place is on something that moves; rows of `Seen`."""
+    for m in range(len(moving)):
+        gap = hypot(x - moving[m, 1], y - moving[m, 2]) - moving[m, 3]
+        if moving[m, 0] >= 0.0 and gap < spare:
+            return True
+    return False
+
+
+@compiled
+def absorb(
+    params: Any,
+    grid: np.ndarray,
+    place: RobotState,
+    scan: np.ndarray,
+    moving: np.ndarray,
+) -> np.ndarray:
+    """The grid after another scan.
+
+    Args:
+        params: A record with the grid's `left`, `bottom` and `cell`, and the lidar's
+            `noise`.
+        grid: Rows of `Cell`.
+        place: From where the scan was taken.
+        scan: Rows of `Ray`.
+        moving: Rows of `Seen`: what is left out.
+    """
+    new = grid.copy()
+    hit = np.zeros(len(grid), np.bool_)
+    passed = np.zeros(len(grid), np.bool_)
+    for k in range(RAYS):
+        r = scan[k, 0]
+        if r == 0.0:
+            continue
+        x = place.x + r * cos(place.theta + k * STEP)
+        y = place.y + r * sin(place.theta + k * STEP)
+        c = cell_of(params, x, y)
+        if c < 0 or walks(moving, x, y, 0.15):
+            continue
+        if new[c, 0] >= RELIABLE:  # else the map would follow the place's errors
+            if not hit[c]:
+                new[c, 0] = min(new[c, 0] + HIT, MOST)
+            hit[c] = True
+            continue
+        known = new[c, 0] > 0.0
+        hits = new[c, 0] / HIT if known else 0.0
+        gain = 1.0 / (1.0 + hits) if not hit[c] or hits < 1.5 else 0.02
+        new[c, 1] += gain * (x - new[c, 1]) if known else x - new[c, 1]
+        new[c, 2] += gain * (y - new[c, 2]) if known else y - new[c, 2]
+        if not hit[c]:
+            new[c, 0] = min(max(new[c, 0], 0.0) + HIT, MOST)
+        hit[c] = True
+    for k in range(RAYS):
+        r = scan[k, 0]
+        # What nothing comes back from is far away, or a dropout, which is rare.
+        far = params.clear if r == 0.0 else min(r - 0.2, params.clear)
+        ex, ey = cos(place.theta + k * STEP), sin(place.theta + k * STEP)
+        # Two rays a cell at three metres: what a ray steps over its neighbours find.
+        for step in range(int(far / (0.8 * params.cell))):
+            along = (step + 0.5) * 0.8 * params.cell
+            j = cell_of(params, place.x + along * ex, place.y + along * ey)
+            if j < 0 or hit[j] or passed[j]:
+                continue
+            if new[j, 0] > 0.0:  # only if it passes through what stood there
+                qx, qy = new[j, 1] - place.x, new[j, 2] - place.y
+                if abs(ex * qy - ey * qx) > 0.05 or ex * qx + ey * qy > far:
+                    continue
+            passed[j] = True
+            new[j, 0] = max(new[j, 0] + MISS, LEAST)
+    return new
+
+
+@compiled
+def stands(params: Any, grid: np.ndarray, x: float, y: float) -> float:
+    """The log of odds of what a point belongs to, 0 if it is new there."""
+    most = 0.0
+    c = cell_of(params, x, y)
+    if c < 0:
+        return most
+    for i in range(-1, 2):
+        for j in range(-1, 2):
+            k = c + i * CELLS + j
+            if k < 0 or k >= len(grid) or grid[k, 0] < SETTLED:
+                continue
+            if hypot(grid[k, 1] - x, grid[k, 2] - y) < params.cell:
+                most = max(most, grid[k, 0])
+    return most
+
+
+@compiled
+def standing(
+    params: Any, grid: np.ndarray, place: RobotState, vision: float
+) -> np.ndarray:
+    """What stands within sight of the memory: points, the nearest first.
+
+    Cells keep their numbers, so that whoever follows one finds it again. Far away one
+    of four neighbours is enough to close a wall.
+
+    Args:
+        params: As for `absorb`; and `point`, the radius that a point is given.
+        grid: Rows of `Cell`.
+        place: Where the robot is.
+        vision: How far it looks [m].
+
+    Returns:
+        Rows of `Seen`, (STANDING, 6).
+    """
+    found = np.empty((len(grid), 2))
+    count = 0
+    reach = int(vision / params.cell) + 2
+    i0 = floor((place.x - params.left) / params.cell)
+    j0 = floor((place.y - params.bottom) / params.cell)
+    for i in range(max(i0 - reach, 0), min(i0 + reach + 1, CELLS)):
+        for j in range(max(j0 - reach, 0), min(j0 + reach + 1, CELLS)):
+            k = i * CELLS + j
+            if grid[k, 0] < OCCUPIED:
+                continue
+            d = hypot(grid[k, 1] - place.x, grid[k, 2] - place.y)
+            if d > vision:
+                continue
+            if d > NEAR:
+                first = True
+                for n in range((i % 2) * 2 + j % 2):  # those before it in its four
+                    o = (i - i % 2 + n // 2) * CELLS + j - j % 2 + n % 2
+                    first = first and grid[o, 0] < OCCUPIED
+                if not first:
+                    continue
+            found[count, 0], found[count, 1] = d, k
+            count += 1
+    rows = np.zeros((STANDING, 6))
+    rows[:, 0] = -1.0
+    order = np.argsort(found[:count, 0])
+    for n in range(min(count, STANDING)):
+        k = int(found[order[n], 1])
+        rows[n, 0] = 1000.0 + k
+        rows[n, 1], rows[n, 2] = grid[k, 1], grid[k, 2]
+        rows[n, 3] = params.point
+    return rows

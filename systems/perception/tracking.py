@@ -1,0 +1,523 @@
+"""Tracking: the circles of scan after scan as things that have a velocity.
+
+A Kalman filter of constant velocity for each, whose cycles are matched by the
+assignment that is likeliest within gates (H. Kuhn's, by scipy). A track is born by
+three scans, lives on while it is hidden, and dies where rays pass through it. What
+moves is told as discs, what stands as the grid's points: nothing is told twice, and
+what the robot has seen to stand it does not forget.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, cos, hypot, inf, isfinite, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from plants.crowd.signals import CAPACITY
+from plants.turtlebot.lidar import RAYS, SCAN, STEP
+from plants.turtlebot.turtlebot import RobotState
+from systems.common.block import Block
+from systems.common.compiled import compiled, packed
+from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import reader, row_writer, size
+from systems.perception.clusters import SEEN as WHOLE
+from systems.perception.clusters import clusters, read_cluster, seen_as
+from systems.perception.grid import standing, stands
+from systems.perception.grid_mapping import SCAN_PERIOD, GridMappingParams
+from systems.perception.grid_mapping import constants as grid_constants
+from systems.perception.signals import GRID, MOVING
+from systems.switching.signals import CORNERS, EDGES, SEEN, Corner, Seen
+
+
+class Track(NamedTuple):
+    """Something that was seen to be one thing; `number` 0 is none."""
+
+    number: float
+    x: float
+    y: float
+    v_x: float
+    v_y: float
+    # Variances of place, of place and velocity, of velocity: the same in x and y.
+    pp: float
+    pv: float
+    vv: float
+    radius: float
+    hits: float
+    # Scans since it was seen last, and whether it moves.
+    missed: float
+    moves: float
+    # Where it stood last.
+    stood_x: float
+    stood_y: float
+
+
+read_track, write_track = reader(Track), row_writer(Track)
+read_robot, write_seen = reader(RobotState), row_writer(Seen)
+write_corner = row_writer(Corner)
+TRACK_SIZE, SEEN_SIZE, CORNER_SIZE = size(Track), size(Seen), size(Corner)
+NOBODY = -1.0
+FORBIDDEN = 1e6
+"""Cost of a match beyond the gate."""
+
+
+@dataclass
+class TrackingParams:
+    """Parameters of clusters and tracks."""
+
+    vision: float = parameter(
+        3.0, "radius R_v within which the planner is told", "m", above=0.0, most=100.0
+    )
+    farthest: float = parameter(12.0, "of what is tracked", "m", above=0.0, most=100.0)
+    jump: float = parameter(
+        0.12, "of ranges between two things", "m", above=0.0, most=2.0
+    )
+    largest: float = parameter(0.6, "radius of what may move", "m", above=0.0, most=5.0)
+    person: float = parameter(
+        0.0,
+        "radius that whoever is seen by the legs is given; 0 if there are no people",
+        "m",
+        least=0.0,
+        most=1.0,
+    )
+    leg: float = parameter(
+        0.13, "greatest radius of a leg, as seen", "m", above=0.0, most=0.5
+    )
+    apart: float = parameter(
+        0.6, "greatest distance of a person's legs", "m", above=0.0, most=2.0
+    )
+    noise: float = parameter(
+        0.02, "standard deviation of a circle's place", "m", above=0.0, most=0.5
+    )
+    hidden_noise: float = parameter(
+        0.1, "of one of which a part is hidden", "m", above=0.0, most=1.0
+    )
+    agility: float = parameter(
+        2.0, "of their accelerations, standard deviation", "m/s^2", above=0.0, most=20.0
+    )
+    gate: float = parameter(
+        4.0, "of a match, in standard deviations", above=0.0, most=20.0
+    )
+    leap: float = parameter(
+        0.4, "of nothing in a scan, whatever the gate says", "m", above=0.0, most=5.0
+    )
+    memory: float = parameter(
+        1.5, "how long what is hidden is believed in", "s", least=0.0, most=60.0
+    )
+    starts: float = parameter(
+        0.15, "speed from which something moves", "m/s", above=0.0, most=2.0
+    )
+    strays: float = parameter(
+        0.2, "so far from where it stood it moves, if slowly", "m", above=0.0, most=2.0
+    )
+    stops: float = parameter(
+        0.04, "speed below which it stands again", "m/s", above=0.0, most=2.0
+    )
+    hides: float = parameter(
+        0.6, "depth behind an edge in which somebody may be", "m", above=0.0, most=5.0
+    )
+    point: float = parameter(
+        0.02, "radius of a point of what stands", "m", above=0.0, most=0.5
+    )
+
+    def rules(self) -> Rules:
+        """Who moves is not at once said to stand."""
+        yield self.stops < self.starts, "stops", f"< starts={self.starts}"
+
+
+@compiled
+def predicted(params: Any, tracks: np.ndarray, dt: float) -> np.ndarray:
+    """All tracks a time later."""
+    rows = tracks.copy()
+    q = params.agility**2
+    for i in range(len(rows)):
+        t = read_track(rows[i])
+        if t.number > 0.0:
+            # White acceleration that lasts for a scan.
+            later = Track(
+                t.number,
+                t.x + dt * t.v_x,
+                t.y + dt * t.v_y,
+                t.v_x,
+                t.v_y,
+                t.pp + 2.0 * dt * t.pv + dt * dt * t.vv + 0.25 * q * dt**4,
+                t.pv + dt * t.vv + 0.5 * q * dt**3,
+                t.vv + q * dt * dt,
+                t.radius,
+                t.hits,
+                t.missed,
+                t.moves,
+                t.stood_x,
+                t.stood_y,
+            )
+            write_track(rows, i, later)
+    return rows
+
+
+@compiled
+def aged(t: Track, missed: float) -> Track:
+    """A track that was not seen."""
+    place = (t.number, t.x, t.y, t.v_x, t.v_y, t.pp, t.pv, t.vv, t.radius, t.hits)
+    return Track(*place, missed, t.moves, t.stood_x, t.stood_y)
+
+
+@compiled
+def costs(
+    params: Any, tracks: np.ndarray, found: np.ndarray, place: RobotState
+) -> np.ndarray:
+    """Squared distances in standard deviations, by track and cluster.
+
+    It is `FORBIDDEN` beyond the gate.
+    """
+    table = np.full((len(tracks), len(found)), FORBIDDEN)
+    for i in range(len(tracks)):
+        t = read_track(tracks[i])
+        for j in range(len(found)):
+            if t.number > 0.0:
+                c = read_cluster(found[j])
+                x, y, sigma = seen_as(params, place, c, t.x, t.y, t.radius)
+                dd = (t.x - x) ** 2 + (t.y - y) ** 2
+                cost = dd / (t.pp + sigma * sigma)
+                if dd < params.leap**2 and (cost < params.gate**2 or dd < 0.01):
+                    table[i, j] = cost
+    return table
+
+
+@compiled
+def evident(table: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Matches that have no alternative, -1 for the rest, and whether others have."""
+    mates = np.full(len(table), -1)
+    free = table < FORBIDDEN
+    chosen = False
+    for i in range(len(table)):
+        for j in range(table.shape[1]):
+            if free[i, j]:
+                if free[i].sum() == 1 and free[:, j].sum() == 1:
+                    mates[i] = j
+                else:
+                    chosen = True
+    return mates, chosen
+
+
+@compiled
+def corrected(
+    params: Any,
+    tracks: np.ndarray,
+    found: np.ndarray,
+    mates: np.ndarray,
+    place: RobotState,
+    scan: np.ndarray,
+    last: float,
+) -> tuple[np.ndarray, float]:
+    """Tracks after the match: filtered, aged, dropped and born.
+
+    Args:
+        params: A record of `TrackingParams`.
+        tracks: Rows of `Track`, predicted.
+        found: Rows of `Cluster`.
+        mates: Of each track the cluster, -1 for none.
+        place: Where the robot is.
+        scan: Rows of `Ray`.
+        last: Number of the track that was born last.
+
+    Returns:
+        The tracks, and the number of the last one.
+    """
+    rows = tracks.copy()
+    taken = np.zeros(len(found), np.bool_)
+    for i in range(len(rows)):
+        t = read_track(rows[i])
+        if t.number == 0.0:
+            continue
+        if mates[i] < 0:
+            k = int(round((atan2(t.y - place.y, t.x - place.x) - place.theta) / STEP))
+            d = hypot(t.x - place.x, t.y - place.y)
+            r = scan[k % RAYS, 0]
+            through = r == 0.0 or r > d + t.radius + 0.1
+            missed = t.missed + (3.0 if through else 1.0)
+            if missed * params.period > params.memory or t.hits < 2.0:
+                rows[i, :] = 0.0
+            else:
+                write_track(rows, i, aged(t, missed))
+            continue
+        c = read_cluster(found[mates[i]])
+        taken[mates[i]] = True
+        x, y, sigma = seen_as(params, place, c, t.x, t.y, t.radius)
+        s = t.pp + sigma * sigma
+        kp, kv = t.pp / s, t.pv / s
+        v_x, v_y = t.v_x + kv * (x - t.x), t.v_y + kv * (y - t.y)
+        speed = hypot(v_x, v_y)
+        far = hypot(t.x - t.stood_x, t.y - t.stood_y) > params.strays
+        # A wall's end that comes out of a shadow grows, and only seems to move.
+        strip = c.cut > 0.0 and c.hidden != WHOLE and t.moves == 0.0
+        if c.known > 1.0 or strip:  # where it stood long enough it still is
+            moves = False
+        elif t.moves > 0.0:
+            moves = speed > params.stops
+        else:
+            moves = t.hits >= 4.0 and (far or speed > params.starts)
+        gain = 0.0 if c.hidden != WHOLE and c.radius < t.radius else 0.3
+        write_track(
+            rows,
+            i,
+            Track(
+                t.number,
+                t.x + kp * (x - t.x),
+                t.y + kp * (y - t.y),
+                v_x,
+                v_y,
+                (1.0 - kp) * t.pp,
+                (1.0 - kp) * t.pv,
+                t.vv - kv * t.pv,
+                t.radius + gain * (c.radius - t.radius),
+                0.25 if strip else t.hits + 1.0,
+                0.0,
+                1.0 if moves else 0.0,
+                t.stood_x if moves or t.moves == 0.0 else x,
+                t.stood_y if moves or t.moves == 0.0 else y,
+            ),
+        )
+    free = 0
+    for j in range(len(found)):
+        c = read_cluster(found[j])
+        if taken[j] or c.known > 0.0:
+            continue
+        inside = False  # a part of what is known already
+        for i in range(len(rows)):
+            t = read_track(rows[i])
+            if t.number > 0.0 and hypot(t.x - c.x, t.y - c.y) < t.radius:
+                inside = True
+        while free < len(rows) and rows[free, 0] > 0.0:
+            free += 1
+        if inside or free == len(rows):
+            continue
+        last += 1.0
+        sigma = params.noise if c.hidden == WHOLE else params.hidden_noise
+        hits = 0.25 if c.cut > 0.0 and c.hidden != WHOLE else 1.0
+        sure = (sigma**2, 0.0, 1.0, c.radius, hits, 0.0, 0.0)
+        new = Track(last, c.x, c.y, 0.0, 0.0, *sure, c.x, c.y)
+        write_track(rows, free, new)
+    return rows, last
+
+
+@compiled
+def told(
+    params: Any, tracks: np.ndarray, dt: float, place: RobotState, within: float
+) -> np.ndarray:
+    """What moves, a time after the scan, within a distance: rows of `Seen`."""
+    rows = np.zeros((len(tracks), SEEN_SIZE))
+    rows[:, 0] = NOBODY
+    for i in range(len(tracks)):
+        t = read_track(tracks[i])
+        x, y = t.x + dt * t.v_x, t.y + dt * t.v_y
+        if t.moves > 0.0 and hypot(x - place.x, y - place.y) <= within:
+            write_seen(rows, i, Seen(t.number, x, y, t.radius, t.v_x, t.v_y))
+    return rows
+
+
+@compiled
+def walking(params: np.ndarray, tracks: np.ndarray, dt: float) -> np.ndarray:
+    """All that moves, as the port `moving` has it."""
+    nowhere = RobotState(0.0, 0.0, 0.0, 0.0, 0.0)
+    table = tracks.reshape((CAPACITY, TRACK_SIZE))
+    return told(params[0], table, dt, nowhere, inf).ravel()
+
+
+@compiled
+def sight(
+    params: np.ndarray,
+    tracks: np.ndarray,
+    dt: float,
+    place: np.ndarray,
+    grid: np.ndarray,
+) -> np.ndarray:
+    """All that the planner is told, as the port `seen` has it."""
+    robot = read_robot(place)
+    rows = grid.reshape((len(grid) // 3, 3))
+    table = tracks.reshape((CAPACITY, TRACK_SIZE))
+    vision = params[0].vision
+    moving = told(params[0], table, dt, robot, vision)
+    return np.concatenate((moving, standing(params[0], rows, robot, vision))).ravel()
+
+
+@compiled
+def observed(
+    params: np.ndarray,
+    tracks: np.ndarray,
+    dt: float,
+    place: np.ndarray,
+    grid: np.ndarray,
+    scan: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
+    """Tracks as predicted, clusters of a scan, and what each match would cost.
+
+    Also the matches that are `evident`, and whether there are others.
+    """
+    robot = read_robot(place)
+    rows, rays = grid.reshape((len(grid) // 3, 3)), scan.reshape((len(scan), 1))
+    table = predicted(params[0], tracks.reshape((CAPACITY, TRACK_SIZE)), dt)
+    found = clusters(params[0], rows, robot, rays)
+    prices = costs(params[0], table, found, robot)
+    mates, chosen = evident(prices)
+    return table, found, prices, mates, chosen
+
+
+@compiled
+def updated(
+    params: np.ndarray,
+    tracks: np.ndarray,
+    found: np.ndarray,
+    mates: np.ndarray,
+    place: np.ndarray,
+    scan: np.ndarray,
+    last: float,
+) -> tuple[np.ndarray, float]:
+    """As `corrected`, of arrays as ports have them."""
+    rays = scan.reshape((len(scan), 1))
+    robot = read_robot(place)
+    return corrected(params[0], tracks, found, mates, robot, rays, last)
+
+
+def matched(table: np.ndarray) -> np.ndarray:
+    """Of each track its cluster, -1 for none: the matches that cost least in all."""
+    mates = np.full(len(table), -1)
+    rows = np.flatnonzero((table < FORBIDDEN).any(axis=1))
+    if rows.size:
+        ones, others = linear_sum_assignment(table[rows])
+        fits = table[rows[ones], others] < FORBIDDEN
+        mates[rows[ones[fits]]] = others[fits]
+    return mates
+
+
+def tracked(
+    params: np.ndarray,
+    tracks: np.ndarray,
+    stamp: np.ndarray,
+    time: float,
+    place: np.ndarray,
+    grid: np.ndarray,
+    scan: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Tracks and stamp after another scan; all as ports and context have them."""
+    if not isfinite(place.sum() + scan.sum()):
+        return tracks, stamp
+    then, last = stamp.tolist()
+    dt = time - then
+    table, found, prices, mates, chosen = observed(
+        params, tracks, dt, place, grid, scan
+    )
+    mates = matched(prices) if chosen else mates
+    table, last = updated(params, table, found, mates, place, scan, last)
+    return table.ravel(), np.array([time, last])
+
+
+def constants(params: TrackingParams, mapping: GridMappingParams) -> np.ndarray:
+    """The parameters as the compiled functions take them."""
+    of_grid = grid_constants(mapping)[0]
+    names = ("left", "bottom", "cell")
+    where = {name: float(of_grid[name]) for name in names}
+    return packed(params, period=SCAN_PERIOD, **where)
+
+
+@compiled
+def corners(
+    params: np.ndarray, place: np.ndarray, grid: np.ndarray, scan: np.ndarray
+) -> np.ndarray:
+    """Edges of what stands, behind which somebody may be; as the port has them."""
+    p, robot = params[0], read_robot(place)
+    rows, rays = grid.reshape((len(grid) // 3, 3)), scan.reshape((len(scan), 1))
+    found = np.zeros((EDGES, CORNER_SIZE))
+    count = 0
+    for k in range(RAYS):
+        r = rays[k, 0]
+        if r == 0.0 or r > p.vision or count == EDGES:
+            continue
+        x = robot.x + r * cos(robot.theta + k * STEP)
+        y = robot.y + r * sin(robot.theta + k * STEP)
+        for side in (-1, 1):
+            open_ = True
+            for n in range(1, 4):  # a single ray may be a dropout
+                s = rays[(k + side * n) % RAYS, 0]
+                open_ = open_ and (s == 0.0 or s > r + p.hides)
+            if open_ and count < EDGES and stands(p, rows, x, y) > 0.0:
+                write_corner(found, count, Corner(1.0, x, y))
+                count += 1
+    return found.ravel()
+
+
+class Tracking(Block):
+    """Tells what moves by its tracks, and what stands by the grid.
+
+    Input that is not finite leaves the tracks as they are.
+
+    Port ``place`` accepts the `RobotState` that the robot believes in.
+    Port ``scan`` accepts rows of `Ray`.
+    Port ``grid`` accepts rows of `Cell`.
+    Port ``moving`` emits rows of `Seen`, all that moves.
+    Port ``seen`` emits rows of `Seen`: what moves and what stands, within sight.
+    Port ``corners`` emits rows of `Corner`: behind which somebody may be.
+    """
+
+    def __init__(
+        self,
+        params: TrackingParams | None = None,
+        mapping: GridMappingParams | None = None,
+    ) -> None:
+        """Makes the block.
+
+        Args:
+            params: Parameters.
+            mapping: Those of the grid.
+
+        Raises:
+            ParameterError: If a parameter is out of range.
+        """
+        super().__init__()
+        params = params or TrackingParams()
+        check(params)
+        self._constants = constants(params, mapping or GridMappingParams())
+        self._place = self.signal_in("place", RobotState)
+        self._scan = self.signal_in("scan", SCAN)
+        self._grid = self.signal_in("grid", GRID)
+        self._tracks = self.DeclareDiscreteState(np.zeros(CAPACITY * TRACK_SIZE))
+        self._stamp = self.DeclareDiscreteState([0.0, 0.0])
+        now = {self.xd_ticket(), self.time_ticket()}
+        self.signal_out("moving", MOVING, self._calc_moving, now)
+        inputs = {self._place.ticket(), self._grid.ticket()}
+        self.signal_out("seen", SEEN, self._calc_seen, now | inputs)
+        self.signal_out(
+            "corners", CORNERS, self._calc_corners, inputs | {self._scan.ticket()}
+        )
+        self.update_every(SCAN_PERIOD, self._update)
+
+    def _state(self, context: Any, group: int) -> np.ndarray:
+        state: np.ndarray = context.get_discrete_state(group).value()
+        return state
+
+    def _now(self, context: Any) -> tuple[np.ndarray, float]:
+        """The tracks, and how long ago they were made."""
+        then = float(self._state(context, self._stamp)[0])
+        return self._state(context, self._tracks), context.get_time() - then
+
+    def _calc_moving(self, context: Any) -> np.ndarray:
+        return walking(self._constants, *self._now(context))
+
+    def _calc_seen(self, context: Any) -> np.ndarray:
+        place, grid = self._place.Eval(context), self._grid.Eval(context)
+        return sight(self._constants, *self._now(context), place, grid)
+
+    def _calc_corners(self, context: Any) -> np.ndarray:
+        place, grid = self._place.Eval(context), self._grid.Eval(context)
+        return corners(self._constants, place, grid, self._scan.Eval(context))
+
+    def _update(self, context: Any) -> Sequence[Any]:
+        return tracked(
+            self._constants,
+            self._state(context, self._tracks),
+            self._state(context, self._stamp),
+            context.get_time(),
+            self._place.Eval(context),
+            self._grid.Eval(context),
+            self._scan.Eval(context),
+        )

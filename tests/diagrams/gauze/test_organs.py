@@ -1,0 +1,75 @@
+"""Organs in the whole loop."""
+
+import numpy as np
+import pytest
+
+from diagrams.common.scenario import ScenarioError
+from diagrams.studies import load_scenario
+from systems.motion.tissue_press import Phase
+from tests.runs import run
+
+pytestmark = pytest.mark.xdist_group("gauze")
+
+
+def test_the_lobe_is_passed_and_nothing_touched():
+    figures = run("gauze_organs").metrics
+    assert figures["reached"]
+    assert figures["max_tissue_force"] == 0.0
+    assert figures["min_organ_clearance"] >= 0.002
+    assert figures["min_tool_clearance"] >= 0.002
+    assert figures["time_ratio"] < 1.3
+
+
+def test_without_constraint_and_bypass_it_would_go_through():
+    through = run(
+        "gauze_organs",
+        "behaviour=field",
+        "clearance_constraint.active=false",
+        "time_ratio=false",
+        "duration=3.0",
+    )
+    assert through.metrics["min_organ_clearance"] < -0.005
+    assert through.metrics["max_tissue_force"] > 1.0
+    assert np.isfinite(through.organs.touch.f).all()
+
+
+def test_it_is_passed_on_a_patient_who_breathes():
+    figures = run("gauze_organs_breathing").metrics
+    assert figures["reached"]
+    assert figures["max_tissue_force"] == 0.0
+    assert figures["min_organ_clearance"] >= 0.002
+
+
+def test_gauze_is_pressed_on_the_liver_by_force():
+    pressed = run("gauze_press")
+    figures, status = pressed.metrics, pressed.press.status
+    assert figures["reached"]
+    assert status.held[-1] == 1.0
+    assert status.phase[-1] == Phase.DONE
+    assert figures["press_force_mean"] == pytest.approx(0.5, abs=0.1)
+    assert abs(figures["press_force_worst"] - 0.5) < 0.3
+    force = np.linalg.norm(pressed.organs.touch.f, axis=1)
+    holding = np.round(status.phase) == Phase.HOLDING
+    assert 1.9 < holding.sum() / 30.0 < 2.1
+    # The wall's lateral force is told apart: it is several times the error.
+    error = pressed.press.touch.force[holding] - force[holding]
+    assert np.sqrt(np.mean(error**2)) < 0.1
+    assert force[status.phase < Phase.PRESSING].max() == 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("wrist=known", "expected 'pwe' with press.active"),
+        ("organs=[]", "expected organs to press on"),
+        ("organs=[{name: liver, file: nowhere.stl}]", "expected a file"),
+        ("organs=[{name: liver, shape: spleen}]", "one of liver"),
+        ("organs=[{name: target}]", "expected names that differ"),
+    ],
+)
+def test_bad_organs_are_refused(change, said):
+    overrides = [change]
+    if change == "wrist=known":
+        overrides.append("wall_motion={}")
+    with pytest.raises(ScenarioError, match=said):
+        load_scenario("gauze_press", overrides)
