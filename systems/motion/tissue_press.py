@@ -27,7 +27,7 @@ from systems.common.geometry import (
     sub,
 )
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, Many, Vector
+from systems.common.signal import Field, Many, Vector, finiteness
 from systems.common.signals import (
     Estimate,
     Guide,
@@ -101,6 +101,11 @@ class TissuePressParams:
     most_force: float = parameter(2.0, "more is given up", "N", above=0.0, most=10.0)
 
 
+finite_velocity, finite_guide = finiteness(Velocity), finiteness(Guide)
+finite_robot, finite_target = finiteness(RobotTool), finiteness(Estimate)
+finite_clearance, finite_touch = finiteness(ClearanceStatus), finiteness(TissueTouch)
+
+
 @compiled
 def _step(
     params: Any,
@@ -114,6 +119,10 @@ def _step(
     touch: TissueTouch,
     moved: np.ndarray,
 ) -> tuple[Press, Velocity, Press]:
+    sound = finite_velocity(v_safe) and finite_guide(guide) and finite_robot(robot)
+    sound = sound and finite_target(target) and finite_clearance(clearance)
+    if not (sound and finite_touch(touch) and np.isfinite(moved).all()):
+        return state, Velocity((0.0, 0.0, 0.0)), state
     row = moved[int(touch.organ)]
     off, v_T = (row[0], row[1], row[2]), (row[3], row[4], row[5])
     phase, since, place, held = state

@@ -184,6 +184,7 @@ COMMANDS = {
     "BackwardMovement": {"v3": RATE},
     "ClassicalPlanner": {"v_R": RATE},
     "ClearanceConstraint": {"v_safe": RATE},
+    "CameraPlanner": {"shaft": HELD, "view_cone": HELD},
     "Endoscope": {"shaft": HELD, "view_cone": HELD},
     "FuzzyArbiter": {"v_R": RATE},
     "GoToTarget": {"v1": RATE},
@@ -194,6 +195,7 @@ COMMANDS = {
     "SnakeTask": {"target": HELD},
     "StatechartPlanner": {"v_R": RATE},
     "SwitchingPlanner": {"v_R": RATE},
+    "TissuePress": {"v_R": RATE},
     "ToolBypass": {"v1": RATE},
     "ToolNavigation": {"tool": TOOL},
     "TubeTask": {"tool": TOOL},
@@ -212,6 +214,7 @@ OBSERVE = {
     *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
+    *("TissueForce", "WallWrench"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}
