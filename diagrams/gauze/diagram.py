@@ -146,11 +146,8 @@ EMULATED = (
 )
 """Figure 2's passive wrist emulation between the local planner and the arm."""
 
-EXTRA_WIRES = (
-    ("endoscope.estimate", "go_to_target.camera"),
-    ("endoscope.view_cone", "go_to_target.view_cone"),
-)
-"""Wires to inputs that only the bypass has."""
+EXTRA_WIRES = (("endoscope.estimate", "go_to_target.camera"),)
+"""Wires to inputs that only the bypass has, besides what the endoscope sees."""
 
 SEEING = (
     ("robot_location.robot_tool", "endoscope.robot_tool"),
@@ -311,7 +308,10 @@ def wiring(
     if scenario.camera_planner.active:
         wires += SEEING
         exports["camera.sight"] = "endoscope.sight"
-    wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
+        ahead = ("endoscope.next_view", "go_to_target.view_cone")
+    else:
+        ahead = ("endoscope.view_cone", "go_to_target.view_cone")
+    wires += [w for w in (*EXTRA_WIRES, ahead) if has_input(systems, w[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)
     return [(known.get(source, source), sink) for source, sink in wires], exports

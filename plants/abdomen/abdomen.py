@@ -15,7 +15,6 @@ most of it dry. Lateral trocar stiffness was not found in vivo: sweep 100 to 300
 from collections.abc import Sequence
 from dataclasses import dataclass
 import math
-from math import asin, atan2, cos, sin
 from typing import Any
 
 from pydrake.geometry import Cylinder
@@ -197,30 +196,29 @@ def spring_on_sleeve(
 
 
 @compiled
-def torque_on_sleeve(C: Pose, w: Vector, stiffness: float, damping: float) -> Vector:
-    """What the bushing's resistance to tilting adds to that torque, in W.
+def turning_on_sleeve(sleeve: Pose, w: Vector, k: Any, d: Any) -> Vector:
+    """The torque in W of a bushing that resists turning, as Drake has it.
 
-    Drake's is a torque on the roll and pitch angles of the sleeve against the fulcrum,
-    whose z axis points into the body.
+    It goes with roll, pitch and yaw of the sleeve in the fulcrum's frame, which is W's
+    turned about x by half a turn.
 
     Args:
-        C: The sleeve's pose.
+        sleeve: Its frame.
         w: Its angular velocity.
-        stiffness: In N m/rad.
-        damping: In N m s/rad.
+        k: The bushing's torque stiffness (3).
+        d: Its torque damping (3).
     """
-    if stiffness == 0.0:
-        return 0.0, 0.0, 0.0
-    # In the fulcrum's frame, turned half about x.
-    x, z = (C.x[0], -C.x[1], -C.x[2]), (C.z[0], -C.z[1], -C.z[2])
-    y = cross(z, x)
-    pitch, roll, yaw = asin(-x[2]), atan2(y[2], z[2]), atan2(x[1], x[0])
-    c, s, cp = cos(yaw), sin(yaw), cos(pitch)
-    rolling = (c * w[0] - s * w[1]) / cp
-    pitching = -s * w[0] - c * w[1]
-    t_r = -(stiffness * roll + damping * rolling) / cp
-    t_p = -(stiffness * pitch + damping * pitching)
-    return c * t_r - s * t_p, -(s * t_r + c * t_p), 0.0
+    x, y, z = sleeve.x, sleeve.y, sleeve.z
+    roll, yaw = math.atan2(-y[2], -z[2]), math.atan2(-x[1], x[0])
+    pitch = math.asin(min(max(x[2], -1.0), 1.0))
+    c, s, cp, tp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.tan(pitch)
+    # Their rates are N times the angular velocity, the torque N^T times theirs.
+    across, along_ = c * w[0] - s * w[1], -s * w[0] - c * w[1]
+    t0 = -k[0] * roll - d[0] * across / cp
+    t1 = -k[1] * pitch - d[1] * along_
+    t2 = -k[2] * yaw - d[2] * (tp * across - w[2])
+    out = t0 / cp + tp * t2
+    return c * out - s * t1, -(s * out + c * t1), -t2
 
 
 def seat_sleeve(plant: Any, context: Any, abdomen: Abdomen) -> None:

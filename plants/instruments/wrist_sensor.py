@@ -19,12 +19,7 @@ from pydrake.common.value import Value
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from plants.abdomen.abdomen import (
-    TURNING_DAMPING,
-    Abdomen,
-    spring_on_sleeve,
-    torque_on_sleeve,
-)
+from plants.abdomen.abdomen import Abdomen, spring_on_sleeve, turning_on_sleeve
 from plants.common.tree import mass_centre, momentum, move_tree, pose_in, read_tree
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
@@ -135,8 +130,9 @@ def _sense(
         stiffness[0],
         c.damping,
     )
-    tilting = torque_on_sleeve(C, xyz(V[c.sleeve], 0), c.turning, c.turning_damping)
-    torque = plus(torque, tilting)
+    if c.turns:
+        turn = turning_on_sleeve(C, xyz(V[c.sleeve], 0), c.turning, c.turning_damping)
+        torque = plus(torque, turn)
     weight = scaled(c.mass, xyz(c.gravity, 0))
     f, m = balance(dh, dp, load, centre, weight, C.p, torque, push, M)
     return Moving(turning, pushing, w, v, v_C, time, f, m, alpha, a, a_C), mount
@@ -221,8 +217,9 @@ class WristSensor(StepBlock):
             mass=plant.CalcTotalMass(self._own, heavy),
             gravity=plant.gravity_field().gravity_vector(),
             damping=float(abdomen.params.damping),
-            turning=float(abdomen.params.turning_stiffness),
-            turning_damping=TURNING_DAMPING * abdomen.params.turning_stiffness,
+            turns=any(abdomen.bushing.torque_stiffness_constants()),
+            turning=np.array(abdomen.bushing.torque_stiffness_constants()),
+            turning_damping=np.array(abdomen.bushing.torque_damping_constants()),
             half=0.5 * period,
         )
         self._tree = read_tree(plant)

@@ -36,7 +36,7 @@ from systems.common.geometry import (
     sub,
 )
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, finiteness, flat, view
+from systems.common.signal import Field, finiteness, view
 from systems.common.signals import Fulcrum, ShaftMotion, Wrench
 from systems.common.step_block import wired
 from systems.passive_wrist.wall_model import lateral_basis
@@ -276,7 +276,7 @@ class TipLoad(Block):
 
     def _calc_update(self, context: Any) -> list[np.ndarray]:
         told = view(Fulcrum, self._estimate.Eval(context))
-        known = flat(Told(tuple(told.p), float(told.sigma_along)))
+        known = np.array([*told.p, told.sigma_along])
         if not np.isfinite(known).all():
             known = context.get_discrete_state(1).value().copy()
         return [self._next.Eval(context)[:17], known]

@@ -11,6 +11,7 @@ from tests.benchmarks import (
     kinematic_scenes,
     organ_suite,
     resection_speed,
+    sensed_suite,
     snake_speed,
     switching_suite,
     wrist_step,
@@ -27,6 +28,7 @@ BENCHMARKS = {
     "snake": snake_speed,
     "resection": resection_speed,
     "switching": switching_suite,
+    "sensed": sensed_suite,
     "wrist-step": wrist_step,
     "wrist": wrist_sweep,
 }

@@ -5,9 +5,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BallRpyJoint, BodyIndex, SpatialInertia
 import pytest
 
-from plants.abdomen.abdomen import add_abdomen, spring_on_sleeve
+from plants.abdomen.abdomen import add_abdomen, spring_on_sleeve, turning_on_sleeve
 from plants.arm.arm import add_arm
-from plants.common.tree import mass_centre, momentum, move_tree, read_tree
+from plants.common.tree import mass_centre, momentum, move_tree, pose_in, read_tree
 from plants.instruments.tube import TubeParams, add_tube, channel_frame
 from plants.snake.snake import add_snake
 
@@ -48,6 +48,12 @@ def test_bodies_momentum_and_spring_are_drakes():
     R = abdomen.sleeve.EvalPoseInWorld(context).rotation()
     np.testing.assert_allclose(force, R @ F.translational(), atol=1e-10)
     np.testing.assert_allclose(torque, R @ F.rotational(), atol=1e-10)
+    k, d = np.array([0.3, 0.4, 0.1]), np.array([0.01, 0.02, 0.03])
+    abdomen.bushing.SetTorqueStiffnessConstants(context, k)
+    abdomen.bushing.SetTorqueDampingConstants(context, d)
+    more = R @ abdomen.bushing.CalcBushingSpatialForceOnFrameC(context).rotational()
+    turning = turning_on_sleeve(pose_in(X, C), tuple(V[C, :3]), k, d)
+    np.testing.assert_allclose(np.add(torque, turning), more, atol=1e-10)
 
 
 def test_other_joints_are_refused():
