@@ -266,6 +266,14 @@ PAPERS: dict[str, list[Row]] = {
         ),
         Row("Figure 12: flowchart, empty on our copy", "", "", "", NOT),
         Row(
+            "3.1.1: obstacles, own place and a grid as perceived (headings only)",
+            "systems/perception/tracking.py",
+            "tests/systems/perception/test_perception.py::"
+            "test_who_walks_is_tracked_and_kept_in_mind_while_hidden",
+            "`perception`",
+            VARIANT,
+        ),
+        Row(
             "3.1.2: kinematic model, control law (headings only)",
             f"{SWITCH}/unicycle_control.py",
             f"{SWITCHED}/test_perception_and_control.py::test_heading_law",

@@ -18,6 +18,7 @@ from plants.arm.posture import home_posture
 from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
+from plants.instruments.tip_push import TipPushParams, add_tip_push
 from plants.instruments.tube import TubeParams, add_tube
 from systems.common.parameter import parameter
 
@@ -74,7 +75,7 @@ def add_bedside(
     Args:
         builder: The diagram's builder.
         scenario: Has `robot`, `arm`, `instrument`, `abdomen`, `wall_motion` and
-            `duration`.
+            `duration`, and may have `tip_push`.
         hang: Adds what else hangs on the instrument to the plant that is not yet
             finalized, and returns its model instances.
 
@@ -117,11 +118,15 @@ def add_bedside(
     plant.SetDefaultPositions(plant.GetPositions(context))
     hold_still(builder, plant, abdomen.sleeve_instance)
     add_wall_motion(builder, plant, abdomen, motion, scenario.duration)
+    pushed = getattr(scenario, "tip_push", TipPushParams())
+    push = add_tip_push(builder, plant, instrument, pushed)
     systems = {
         "plant": plant,
         "scene_graph": scene_graph,
         "wall_force": add_wall_force(builder, plant, abdomen, motion.stiffness_factor),
     }
+    if push:
+        systems["tip_push"] = push
     return Bedside(systems, posture, instrument, abdomen, below)
 
 

@@ -8,6 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.bedside.bedside import Bedside
 from diagrams.common.scenario import ScenarioError
 from plants.abdomen.wall_motion import WallMotionParams
+from plants.instruments.tip_push import TipPushParams
 from systems.common.parameter import parameter, part
 from systems.common.signals import (
     Fulcrum,
@@ -20,6 +21,7 @@ from systems.common.signals import (
 from systems.passive_wrist.fulcrum_estimator import Covariance, FulcrumEstimator
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
+from systems.passive_wrist.tip_load import TipForce, TipLoad, TipLoadParams
 from systems.passive_wrist.wrist_law import MODES, WristParams
 from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
 from systems.sensing.wrench_watch import WrenchWatch, WrenchWatchParams
@@ -37,6 +39,33 @@ WRIST_WIRES = (
     ("passive_wrist.permission", "joint_commands.permission"),
 )
 """Sensor, estimator and emulation; the task's tool goes to `tool_wanted`."""
+
+TIP_WIRES = (
+    ("tool_wrench.shaft", "tip_load.shaft"),
+    ("tool_wrench.wrench", "tip_load.wrench"),
+    ("fulcrum_estimator.estimate", "tip_load.estimate"),
+    ("tip_load.wall", "wrench_watch.wrench"),
+)
+"""What takes the place of the wire to the watch where tip and wall are told apart."""
+
+
+def wrist_wires(scenario: Any) -> list[tuple[str, str]]:
+    """The wires of sensor, estimator and emulation; `tool_wanted` is left."""
+    if not scenario.tip_load.active:
+        return [*WRIST_WIRES]
+    direct = ("tool_wrench.wrench", "wrench_watch.wrench")
+    return [*(wire for wire in WRIST_WIRES if wire != direct), *TIP_WIRES]
+
+
+def wrist_exports(scenario: Any) -> dict[str, str]:
+    """What can be logged of it."""
+    return WRIST_EXPORTS | (TIP_EXPORTS if scenario.tip_load.active else {})
+
+
+def wrist_signals(scenario: Any) -> dict[str, Any]:
+    """What is logged of it."""
+    return WRIST_SIGNALS | (TIP_SIGNALS if scenario.tip_load.active else {})
+
 
 WRIST_EXPORTS = {
     "wrist.fulcrum": "fulcrum_estimator.estimate",
@@ -59,6 +88,19 @@ WRIST_SIGNALS = {
     "wall.fulcrum": MovingPoint,
 }
 """What is logged of it."""
+
+
+TIP_EXPORTS = {"wrist.tip_force": "tip_load.tip_force"}
+TIP_SIGNALS = {"wrist.tip_force": TipForce}
+"""The same where tip and wall are told apart."""
+
+
+@dataclass
+class TipSettings:
+    """What a scenario says of the tip's load."""
+
+    tip_load: TipLoadParams = part(TipLoadParams)
+    tip_push: TipPushParams = part(TipPushParams)
 
 
 @dataclass
@@ -135,6 +177,17 @@ def add_wrist(
         "passive_wrist": PassiveWristEmulation(wrist),
     }
     systems["wrist_sensor"] = builder.GetSubsystemByName("wrist_sensor")
-    for name in ("wrench_watch", "fulcrum_estimator", "passive_wrist"):
+    if push := bedside.systems.get("tip_push"):
+        builder.Connect(
+            push.get_output_port(),
+            systems["wrist_sensor"].GetInputPort("applied_spatial_force"),
+        )
+    new = ["wrench_watch", "fulcrum_estimator", "passive_wrist"]
+    tip = getattr(scenario, "tip_load", TipLoadParams())
+    if tip.active:
+        told = replace(tip, length=scenario.instrument.length, period=sensor.period)
+        systems["tip_load"] = TipLoad(told, guess)
+        new.append("tip_load")
+    for name in new:
         builder.AddNamedSystem(name, systems[name])
     return systems

@@ -76,12 +76,22 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
         "time_frozen": float(np.mean((code == 8) | (code == 9)) * time[-1]),
         "mean_speed_scale": float(scale[late].mean()) if late.any() else None,
     }
+    if "wrist.tip_force" in run.logged:
+        figures["rms_tip_force_error"] = tip_force_error(run)
     if event >= 0.0:
         after = time >= event
         clock, load = time[after] - event, force[after]
         figures["time_to_2N"] = last_above(clock, load, 2.0)
         figures["time_to_02N"] = last_above(clock, load, 0.2)
     return figures
+
+
+def tip_force_error(run: Any) -> float | None:
+    """Of the side force at the tip that is told, against the one that pushes [N]."""
+    u = run.wrist.shaft.u
+    true = np.array([run.scenario.tip_push.at(t) for t in run.signals["time"]])
+    true -= np.einsum("ni,ni->n", true, u)[:, None] * u
+    return rms(np.linalg.norm(run.wrist.tip_force.f - true, axis=1))
 
 
 def rms(values: np.ndarray) -> float | None:

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
+from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
 from diagrams.gauze import organs as inside
 from diagrams.gauze.scenario import GauzeScenario
@@ -20,7 +20,7 @@ from diagrams.gauze.theatre import add_theatre
 from diagrams.gauze.tools import OBSTACLE, HandTool, hands
 from plants.organs.organs import OrganSet
 from plants.surgeon.hunting_tool import HuntingTool
-from plants.surgeon.surgeon_tool import SurgeonTool
+from plants.surgeon.surgeon_tool import Patient, SurgeonTool
 from systems.auto_guidance.backward_movement import BackwardMovement
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
 from systems.auto_guidance.go_to_target import GoToTarget
@@ -34,6 +34,7 @@ from systems.motion.endoscope import Endoscope
 from systems.motion.joint_commands import JointCommands
 from systems.motion.tool_navigation import ToolNavigation
 from systems.sensing.optical_tracker import OpticalTracker
+from systems.sensing.registration import Registration
 from systems.sensing.robot_location import RobotLocation
 from systems.sensing.trajectory_estimator import TrajectoryEstimator
 
@@ -71,6 +72,7 @@ WIRES = (
     ("endoscope.view_cone", "clearance_constraint.view_cone"),
     # The guide point's velocity becomes tool motion, then joint motion.
     ("clearance_constraint.v_safe", "tool_navigation.v_R"),
+    ("clearance_constraint.status", "tool_navigation.clearance"),
     ("go_to_target.guide", "tool_navigation.guide"),
     ("robot_location.robot_tool", "tool_navigation.robot_tool"),
     ("obstacles.estimates", "tool_navigation.obstacles"),
@@ -95,7 +97,7 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
     for name, tool in hands(scenario.tools, scenario.seed).items():
         wires += [
             (f"{name}_tool.shaft", f"optical_tracker.{name}"),
-            (f"optical_tracker.{name}_measured", f"{name}_estimator.measurement"),
+            *seen(name, scenario.registration.active),
             (f"{name}_tool.shaft", f"posed_tools.{name}"),
             (f"{name}_tool.shaft", f"clearance.{name}"),
         ]
@@ -109,6 +111,25 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
     return wires
 
 
+def seen(name: str, registered: bool) -> list[tuple[str, str]]:
+    """The wires from the tracker to a tool's estimator."""
+    measured, wanted = (
+        f"optical_tracker.{name}_measured",
+        f"{name}_estimator.measurement",
+    )
+    if not registered:
+        return [(measured, wanted)]
+    mended = f"registration.{name}"
+    return [(measured, f"{mended}_measured"), (mended, wanted)]
+
+
+REGISTERED = (
+    ("tool_shaft.shaft", "optical_tracker.robot"),
+    ("optical_tracker.robot_measured", "registration.robot_measured"),
+    ("plant.pa10_state", "registration.arm_state"),
+)
+"""The tracker sees the robot's own tool as well."""
+
 TOLD = (
     ("fulcrum.y0", "robot_location.fulcrum"),
     ("fulcrum.y0", "joint_commands.fulcrum"),
@@ -117,7 +138,6 @@ TOLD = (
 """The wires that the passive wrist takes the place of."""
 
 EMULATED = (
-    *WRIST_WIRES,
     ("passive_wrist.pivot", "robot_location.fulcrum"),
     ("passive_wrist.pivot", "joint_commands.fulcrum"),
     ("tool_navigation.tool", "passive_wrist.tool_wanted"),
@@ -126,11 +146,8 @@ EMULATED = (
 )
 """Figure 2's passive wrist emulation between the local planner and the arm."""
 
-EXTRA_WIRES = (
-    ("endoscope.estimate", "go_to_target.camera"),
-    ("endoscope.view_cone", "go_to_target.view_cone"),
-)
-"""Wires to inputs that only the bypass has."""
+EXTRA_WIRES = (("endoscope.estimate", "go_to_target.camera"),)
+"""Wires to inputs that only the bypass has, besides what the endoscope sees."""
 
 SEEING = (
     ("robot_location.robot_tool", "endoscope.robot_tool"),
@@ -180,9 +197,12 @@ EXTRA_EXPORTS = {"planner.way": "go_to_target.way"}
 """Outputs that only the bypass has."""
 
 
-def make_tool(tool: HandTool) -> Any:
+def make_tool(tool: HandTool, scenario: GauzeScenario) -> Any:
     """The block of a tool in the surgeon's hand."""
-    return HuntingTool(tool, tool.hunt) if tool.hunt.speed else SurgeonTool(tool)
+    if tool.hunt.speed:
+        return HuntingTool(tool, tool.hunt)
+    patient = Patient(scenario.wall_motion.excursion, scenario.duration)
+    return SurgeonTool(tool, patient)
 
 
 def aliases(scenario: GauzeScenario) -> dict[str, str]:
@@ -208,12 +228,13 @@ def make_blocks(
     s = scenario
     tools = hands(s.tools, s.seed)
     obstacles = [name for name, tool in tools.items() if tool.role == OBSTACLE]
+    shown = [*tools, "robot"] if s.registration.active else [*tools]
     # The planner knows the limits of the navigation behind it.
     around = (s.margins, s.navigation, s.workspace)
     blocks: dict[str, Any] = {
-        "optical_tracker": OpticalTracker(s.tracker, list(tools)),
+        "optical_tracker": OpticalTracker(s.tracker, shown),
         "tracker_noise": RandomSource(
-            RandomDistribution.kGaussian, 6 * len(tools), s.tracker.period
+            RandomDistribution.kGaussian, 6 * len(shown), s.tracker.period
         ),
         "endoscope": CameraPlanner(s.camera_planner, s.camera, obstacles, organs)
         if s.camera_planner.active
@@ -234,7 +255,7 @@ def make_blocks(
         "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
     }
     for name, tool in tools.items():
-        blocks[f"{name}_tool"] = make_tool(tool)
+        blocks[f"{name}_tool"] = make_tool(tool, s)
         blocks[f"{name}_estimator"] = TrajectoryEstimator(
             replace(
                 s.estimator,
@@ -245,6 +266,13 @@ def make_blocks(
         )
     if len(obstacles) > 1:
         blocks["obstacle_estimates"] = Multiplexer([size(Estimate)] * len(obstacles))
+    if s.registration.active:
+        blocks["registration"] = Registration(
+            replace(s.registration, period=s.tracker.period),
+            list(tools),
+            s.tracker.body,
+            s.instrument,
+        )
     if not s.emulated:
         blocks["fulcrum"] = ConstantVectorSource(s.robot.p_WG)
     return blocks
@@ -262,8 +290,15 @@ def wiring(
     wires = [*WIRES, *tool_wires(scenario)]
     exports = EXPORTS | tool_exports(scenario)
     if scenario.emulated:
-        wires = [*(wire for wire in wires if wire not in TOLD), *EMULATED]
-        exports |= WRIST_EXPORTS
+        wires = [
+            *(wire for wire in wires if wire not in TOLD),
+            *EMULATED,
+            *wrist_wires(scenario),
+        ]
+        exports |= wrist_exports(scenario)
+    if scenario.registration.active:
+        wires += REGISTERED
+        exports |= {"tracker.alignment": "registration.alignment"}
     if scenario.organs:
         wires = inside.wired(scenario, wires)
         wires = [wire for wire in wires if has_input(systems, wire[1])]
@@ -273,7 +308,10 @@ def wiring(
     if scenario.camera_planner.active:
         wires += SEEING
         exports["camera.sight"] = "endoscope.sight"
-    wires += [wire for wire in EXTRA_WIRES if has_input(systems, wire[1])]
+        ahead = ("endoscope.next_view", "go_to_target.view_cone")
+    else:
+        ahead = ("endoscope.view_cone", "go_to_target.view_cone")
+    wires += [w for w in (*EXTRA_WIRES, ahead) if has_input(systems, w[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
     known = aliases(scenario)
     return [(known.get(source, source), sink) for source, sink in wires], exports

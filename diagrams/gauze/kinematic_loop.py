@@ -69,11 +69,13 @@ class Robot:
         max_speed: Of the tip, m/s.
         max_turning: Of the shaft, rad/s.
         least_insertion: m.
+        max_acceleration: Of the tip, m/s^2; unlimited where it is infinite.
     """
 
     max_speed: float = 0.1
     max_turning: float = 1.0
     least_insertion: float = 0.015
+    max_acceleration: float = float("inf")
 
     def moved(self, g: Vector, p: Vector, v: Vector, dt: float) -> Vector:
         """The tip after `dt` seconds at velocity v within the limits."""
@@ -130,7 +132,7 @@ def run(
         sense: Makes of the time and O's exact estimate what the planner gets.
     """
     robot = robot or Robot()
-    tip = scene.p_WPr
+    tip, velocity = scene.p_WPr, (0.0, 0.0, 0.0)
     clearance, fraction = float("inf"), 1.0
     arrival: float | None = None
     target = estimate(scene.p_WPs, scene.p_WPs)
@@ -148,7 +150,9 @@ def run(
         if watch:
             watch(time, tip)
         for i in range(substeps):
-            tip = robot.moved(scene.p_WGr, tip, v_tip, dt)
+            change = limited(sub(v_tip, velocity), robot.max_acceleration * dt)
+            velocity = plus(velocity, change)
+            tip = robot.moved(scene.p_WGr, tip, velocity, dt)
             p = scene.obstacle_tip(time + (i + 1) * dt)[0]
             near = closest_points(scene.p_WGr, tip, scene.p_WGo, p)
             if near.distance - CONTACT < clearance:

@@ -38,7 +38,12 @@ SPEED = ROBOT.max_speed
 NO_CONE = ViewCone((0.0, 0.0, 0.2), (0.0, 0.0, -1.0), 3.2)
 """A view cone that holds everything: there is no camera in the scenes."""
 ROOM = workspace.constants(
-    ReachLimits(min_insertion=ROBOT.least_insertion, max_insertion=0.5, max_tilt=3.1),
+    ReachLimits(
+        min_insertion=ROBOT.least_insertion,
+        max_insertion=0.5,
+        max_tilt=3.1,
+        wrist_speed=100.0,
+    ),
     WorkspaceParams(floor=-0.065),
 )[0]
 """The scenes' workspace."""
@@ -223,11 +228,35 @@ class Constrained:
             wanted,
             tools,
             self._dodging,
+            np.zeros((1 + len(tools), 3)),
         )
         self.seconds.append(time.perf_counter() - start)
         if status.near:
             self.holds = self.holds and status.condition > 0.5
         return v
+
+
+TRAVEL = 0.06
+"""How fast the robot at the bedside travels; it evades faster, m/s."""
+
+
+def traveller(params: ClearanceConstraintParams) -> Constrained:
+    """A fresh planner that travels at `TRAVEL` and evades as the constraint does."""
+    inner = Bypass(
+        go=GoToTargetParams(max_speed=TRAVEL),
+        arbiter=FuzzyArbiterParams(max_speed=TRAVEL),
+        bypass=ToolBypassParams(max_speed=TRAVEL),
+    )
+    return Constrained(inner, params)
+
+
+def robot_of(params: ClearanceConstraintParams) -> Robot:
+    """The ideal robot that is as fast as its constraint reckons with."""
+    return Robot(
+        max_speed=params.max_speed,
+        max_turning=params.turning_speed,
+        max_acceleration=params.acceleration,
+    )
 
 
 FIELD: dict[str, Any] = {

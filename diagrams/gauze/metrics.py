@@ -4,16 +4,23 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.bedside.wrist_metrics import wrist_figures
+from diagrams.bedside.wrist_metrics import most, rms, wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
+from diagrams.gauze.foresight import Reach, unavoidable
 from diagrams.gauze.organs import organ_figures
+from diagrams.gauze.scenes import CONTACT
 from diagrams.gauze.sight import sight_figures
 from diagrams.gauze.tools import TARGET, gap, logged
 from plants.surgeon.recording import load_recording
+from systems.common.signal import vector
 from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
 """The gauze is delivered while the tip is this close to S's true tip [m] ..."""
+SETTLED = 3.0
+"""Figures of the force that leave out how the fulcrum is found start here [s]."""
+GAUZE = 0.004
+"""Radius of the gauze at the tip [m]."""
 REACHED_TIME = 0.5
 """... for this long [s]."""
 
@@ -63,6 +70,55 @@ def in_cone(points: np.ndarray, cone: Any) -> np.ndarray:
     return np.arccos(np.clip(cosine, -1.0, 1.0)) <= cone.half
 
 
+def tool_lines(run: Any) -> tuple[np.ndarray, np.ndarray]:
+    """True tips and shafts' inner ends of the obstacles over time (n, tools, 3) [m]."""
+    shafts = [logged(run, tool).shaft for tool in run.scenario.obstacles]
+    tips = np.stack([shaft.tip for shaft in shafts], axis=1)
+    # Where each axis is at its trocar's height: the wall's own breath is small there.
+    u = np.stack([shaft.u for shaft in shafts], axis=1)
+    high = np.array([tool.p_WG[2] for tool in run.scenario.obstacles])
+    back = (tips[..., 2] - high) / np.minimum(u[..., 2], -0.1)
+    return tips, tips - back[..., None] * u
+
+
+def gauze_clearance(run: Any) -> float:
+    """Least distance of the gauze's surface at R's tip from an obstacle's [m]."""
+    tips, fulcrums = tool_lines(run)
+    shaft = fulcrums - tips
+    way = run.robot.tool.tip[:, None] - tips
+    share = np.einsum("nik,nik->ni", way, shaft) / np.sum(shaft**2, axis=-1)
+    near = way - np.clip(share, 0.0, 1.0)[..., None] * shaft
+    return float(np.linalg.norm(near, axis=-1).min() - GAUZE - CONTACT / 2.0)
+
+
+def could_not_be_avoided(run: Any) -> bool:
+    """Whether a robot that knew the future would have been touched as well."""
+    s = run.scenario
+    nav = s.navigation
+    reach = Reach(
+        nav.escape_speed,
+        nav.escape_acceleration,
+        nav.wrist_speed / (nav.shaft_length - nav.min_insertion),
+        nav.min_insertion,
+        nav.max_tilt,
+    )
+    tips, fulcrums = tool_lines(run)
+    start = vector(s.robot.p_WP)
+    time = run.signals["time"]
+    return unavoidable(
+        reach, CONTACT, time, vector(s.robot.p_WG), start, tips, fulcrums
+    )
+
+
+def registration_error(run: Any) -> float:
+    """By how much S's tip is misplaced at the end by tracker and alignment [m]."""
+    told, believed = run.scenario.tracker, run.tracker.alignment
+    p = logged(run, run.scenario.target).shaft.tip[-1]
+    off = np.array(told.shift) - believed.t[-1]
+    turned = np.array(told.turn) - believed.theta[-1]
+    return float(np.linalg.norm(off + np.cross(turned, p)))
+
+
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     time = run.signals["time"]
@@ -83,6 +139,10 @@ def measure(run: Any) -> dict[str, Any]:
         "max_lateral_force": float(force.max()),
         "rms_lateral_force": float(np.sqrt(np.mean(force**2))),
         "max_fulcrum_error": float(run.wall.fulcrum_error.distance.max()),
+        "max_lateral_force_3s": most(force[time >= SETTLED]),
+        "rms_lateral_force_3s": rms(force[time >= SETTLED]),
+        "min_gauze_clearance": gauze_clearance(run),
+        "unavoidable": could_not_be_avoided(run),
         "time_in_view": float(
             in_cone(tip, logged(run, run.scenario.camera).view_cone).mean()
         ),
@@ -93,6 +153,8 @@ def measure(run: Any) -> dict[str, Any]:
     played = recordings_played(run)
     if played is not None:
         figures["recording_played"] = played
+    if run.scenario.registration.active:
+        figures["registration_error"] = registration_error(run)
     figures |= bypass_figures(run, arrival, tip_error) | organ_figures(run)
     figures |= sight_figures(run)
     if run.scenario.emulated:

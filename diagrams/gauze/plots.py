@@ -7,6 +7,7 @@ import numpy as np
 
 from diagrams.bedside import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
+from diagrams.gauze import organ_plots
 from diagrams.gauze.bypass_plots import clearance, forms
 from diagrams.gauze.scenario import PAPER
 from diagrams.gauze.tools import TARGET, gap, logged
@@ -164,6 +165,10 @@ def plots(run: Any) -> dict[str, Figure]:
         "virtual_force": virtual_force(run),
         "clearance": clearance(run),
     }
+    if run.scenario.organs:
+        figures["organs"] = organ_plots.organs(run)
+    if run.scenario.judge_sight:
+        figures["sight"] = organ_plots.sight(run)
     if PAPER in run.case.companions:
         figures["forms"] = forms({"bypass": run, PAPER: run.case.companions[PAPER]})
     if run.scenario.emulated:

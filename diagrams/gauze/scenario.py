@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import WristSettings, check_wrist
+from diagrams.bedside.wrist import TipSettings, WristSettings, check_wrist
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.gauze.tools import (
     CAMERA,
@@ -23,6 +23,7 @@ from plants.organs.organ_touch import OrganTouchParams
 from plants.organs.organs import Organ, surface_of
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
+from plants.surgeon.synthetic_hand import SyntheticHand
 from systems.auto_guidance.backward_movement import BackwardMovementParams
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiterParams
 from systems.auto_guidance.go_to_target import GoToTargetParams
@@ -45,6 +46,7 @@ from systems.motion.tool_navigation import (
     reachable,
 )
 from systems.sensing.optical_tracker import OpticalTrackerParams
+from systems.sensing.registration import RegistrationParams
 from systems.sensing.tissue_force import TissueForceParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
@@ -53,7 +55,7 @@ BEHAVIOURS = ("bypass", "field")
 
 
 @dataclass
-class GauzeScenario(Scenario, WristSettings):
+class GauzeScenario(Scenario, WristSettings, TipSettings):
     """Auto-guided movements (section 5 of the paper): gauze to the surgeon."""
 
     known_fulcrums: bool = parameter(
@@ -81,6 +83,7 @@ class GauzeScenario(Scenario, WristSettings):
         False, "whether the paper's planner is run as well and drawn beside it"
     )
     tracker: OpticalTrackerParams = part(OpticalTrackerParams)
+    registration: RegistrationParams = part(RegistrationParams)
     estimator: TrajectoryEstimatorParams = part(TrajectoryEstimatorParams)
     margins: Margins = part(Margins)
     workspace: WorkspaceParams = part(WorkspaceParams)
@@ -157,7 +160,14 @@ def withdrawn(tool: HandTool) -> HandTool:
     x, y, z = tool.p_WG
     inside = [[x, y, z - WITHDRAWN]]
     return replace(
-        tool, times=[0.0], points=inside, recording=None, pushes=[], hunt=Hunt()
+        tool,
+        times=[0.0],
+        points=inside,
+        recording=None,
+        pushes=[],
+        hunt=Hunt(),
+        hand=SyntheticHand(),
+        carried=[0.0, 0.0, 0.0],
     )
 
 
@@ -209,6 +219,11 @@ def check_tools(scenario: GauzeScenario) -> None:
             raise ScenarioError(
                 f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with a "
                 "recording"
+            )
+        if tool.hunt.speed and (tool.breathes or tool.hand.seed):
+            raise ScenarioError(
+                f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with "
+                "breathing or a synthetic hand"
             )
         if tool.recording:
             second = float(load_recording(tool.recording)[0][1])

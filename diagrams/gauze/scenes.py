@@ -13,6 +13,9 @@ Tools are 5 mm thick.
   to rest where it leaves the final pose free.
 - "blocked": O stands on the target's own line, within D_safe of the final pose, for
   6 s; then it leaves at 40 mm/s for a place that frees it.
+- "hands": a "moving" scene whose O is in a synthetic hand for 20 s, with the tails of a
+  real one (`plants.surgeon.synthetic_hand`); it may go anywhere, S's shaft to slide
+  along stands at the target.
 - "crowded": one or two more tools stand in the cavity besides the standing one; start
   and final pose are clear of all, and all leave 26.5 mm at G_R.
 
@@ -25,6 +28,8 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
+from plants.surgeon.synthetic_hand import Line, SyntheticHand, synthetic_motion
+from plants.surgeon.tool_motion import Motion, recorded_motion
 from systems.common.geometry import (
     Vector,
     along,
@@ -38,7 +43,7 @@ from systems.common.geometry import (
 CONTACT = 0.005
 """Distance of the axes at contact, m: two radii of 2.5 mm."""
 
-_STREAMS = {"standing": 0, "moving": 1, "blocked": 11, "crowded": 12}
+_STREAMS = {"standing": 0, "moving": 1, "blocked": 11, "crowded": 12, "hands": 13}
 KINDS = tuple(_STREAMS)
 _WANDER_TIME = 7.0
 _ACCELERATION = 0.4
@@ -47,6 +52,7 @@ _LEAVING_SPEED = 0.04
 _FREE = CONTACT + 0.003
 _BLOCKED = 0.007
 _FROM_G_R = 0.0265
+_HAND_TIME = 20.0
 _TRIES = 1000
 _FEW_TRIES = 300
 
@@ -126,6 +132,7 @@ class Scene:
         p_WGo: The obstacle tool's fulcrum, m.
         legs: The motion of its tip; a single one of zero length if it stands.
         others: Further tools that stand, tip and fulcrum of each, m.
+        hand: The motion of O's tip in the place of legs.
     """
 
     p_WGr: Vector
@@ -134,14 +141,18 @@ class Scene:
     p_WGo: Vector
     legs: list[Leg]
     others: tuple[tuple[Vector, Vector], ...] = ()
+    hand: Motion | None = None
 
     @property
     def rest_time(self) -> float:
         """From when on O rests, s."""
-        return self.legs[-1].end
+        return _HAND_TIME if self.hand else self.legs[-1].end
 
     def obstacle_tip(self, time: float) -> tuple[Vector, Vector, Vector]:
         """Position, velocity and acceleration of O's tip."""
+        if self.hand:
+            x, y, z, vx, vy, vz = self.hand(time)
+            return (x, y, z), (vx, vy, vz), (0.0, 0.0, 0.0)
         for leg in self.legs:
             if time < leg.end:
                 return leg.at(time)
@@ -181,16 +192,31 @@ def _draw(rng: np.random.Generator, kind: str) -> Scene | None:
         return None
     if segment_triangle_distance(g_o, tip, g_r, start, goal) >= CONTACT:
         return None
-    moving = kind == "moving"
+    moving = kind in ("moving", "hands")
     room, from_g_r = (0.01, 0.03) if moving else (0.005, _FROM_G_R)
     if not _stands_well(g_r, g_o, tip, start, room, from_g_r):
         return None
+    if kind == "hands":
+        return _in_a_hand(rng, dome, Scene(g_r, start, goal, g_o, []), tip)
     if moving:
         legs = _wander(rng, dome, g_o, tip, g_r, goal, from_g_r)
         return Scene(g_r, start, goal, g_o, legs) if legs else None
     if closest_points(g_r, goal, g_o, tip).distance < _FREE:
         return None
     return Scene(g_r, start, goal, g_o, [Leg(0.0, tip, tip, 1.0)])
+
+
+def _in_a_hand(
+    rng: np.random.Generator, dome: float, base: Scene, tip: Vector
+) -> Scene:
+    """O in a hand that is drawn, and S's shaft beside it."""
+    g_s = _draw_fulcrum(rng, dome)
+    hand = SyntheticHand(seed=int(rng.integers(1, 2**31)))
+    line = Line(np.array(base.p_WPs), np.array(g_s))
+    times, path = synthetic_motion(
+        hand, np.array(base.p_WGo), np.array(tip), _HAND_TIME, line
+    )
+    return replace(base, hand=recorded_motion(times, path))
 
 
 def _draw_blocked(rng: np.random.Generator) -> Scene | None:

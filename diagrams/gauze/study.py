@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.bedside.bedside import stiffen
-from diagrams.bedside.wrist import WRIST_SIGNALS
+from diagrams.bedside.wrist import wrist_signals
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
@@ -20,10 +20,10 @@ from plants.abdomen.wall_force import FulcrumError
 from plants.arm.signals import Posture
 from plants.instruments.clearance import Gap, column
 from systems.auto_guidance.fuzzy_arbiter import Weights
-from systems.bypass.clearance_constraint import ClearanceStatus
 from systems.bypass.tool_bypass import Way
 from systems.common.signal import Many
 from systems.common.signals import (
+    ClearanceStatus,
     Estimate,
     Force,
     Guide,
@@ -36,6 +36,7 @@ from systems.common.signals import (
 from systems.motion.joint_commands import Status
 from systems.motion.sight import Sight
 from systems.motion.tool_navigation import StopCode
+from systems.sensing.registration import Alignment
 
 SIGNALS = {
     "planner.guide": Guide,
@@ -72,7 +73,9 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
         port: Many(Gap, columns) if port == "clearance" else kind
         for port, kind in SIGNALS.items()
     }
-    ports |= WRIST_SIGNALS if scenario.emulated else {}
+    ports |= wrist_signals(scenario) if scenario.emulated else {}
+    if scenario.registration.active:
+        ports["tracker.alignment"] = Alignment
     ports |= organ_signals(scenario)
     if scenario.camera_planner.active:
         ports["camera.sight"] = Sight

@@ -6,6 +6,7 @@ from diagrams.bedside.bedside import Bedside, add_bedside
 from diagrams.gauze.tools import in_the_way
 from plants.instruments.clearance import add_clearance
 from plants.instruments.posed_tools import PosedToolsParams, add_posed_tools
+from plants.instruments.tool_shaft import add_tool_shaft
 
 
 def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> Bedside:
@@ -21,6 +22,10 @@ def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> 
     """
     bedside = bedside or add_bedside(builder, scenario)
     plant, scene_graph = bedside.systems["plant"], bedside.systems["scene_graph"]
+    if scenario.registration.active:
+        bedside.systems["tool_shaft"] = add_tool_shaft(
+            builder, plant, bedside.instrument
+        )
     tools = [(tool.name, tool.role) for tool in scenario.tools]
     looks = PosedToolsParams(
         view_half_angle=scenario.camera.half_angle,

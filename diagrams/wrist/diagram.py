@@ -6,7 +6,7 @@ from typing import Any
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.bedside.bedside import add_bedside
-from diagrams.bedside.wrist import WRIST_EXPORTS, WRIST_WIRES, add_wrist
+from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.wrist.scenario import WristScenario
 from systems.motion.joint_commands import JointCommands
@@ -14,7 +14,6 @@ from systems.passive_wrist.arc_navigation import ArcNavigation
 from systems.sensing.robot_location import RobotLocation
 
 WIRES = (
-    *WRIST_WIRES,
     # The task plans its arcs about the fulcrum that the wrist turns about.
     ("passive_wrist.pivot", "arc_navigation.fulcrum"),
     ("passive_wrist.permission", "arc_navigation.permission"),
@@ -26,7 +25,7 @@ WIRES = (
     ("passive_wrist.pivot", "joint_commands.fulcrum"),
 )
 
-EXPORTS = WRIST_EXPORTS | {
+EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
     "navigation.tool": "arc_navigation.tool",
     "joints.status": "joint_commands.status",
@@ -67,4 +66,11 @@ def make_wrist_diagram(
         swaps,
     )
     systems = bedside.systems | add_wrist(builder, bedside, scenario) | blocks
-    return finish(builder, "passive_wrist", systems, WIRES, EXPORTS, scenario.faults)
+    return finish(
+        builder,
+        "passive_wrist",
+        systems,
+        [*WIRES, *wrist_wires(scenario)],
+        EXPORTS | wrist_exports(scenario),
+        scenario.faults,
+    )

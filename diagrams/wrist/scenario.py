@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import WristSettings
+from diagrams.bedside.wrist import TipSettings, WristSettings
 from diagrams.common.scenario import Scenario
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
@@ -15,7 +15,7 @@ from systems.passive_wrist.wrist_law import MODES
 
 
 @dataclass
-class WristScenario(Scenario, WristSettings):
+class WristScenario(Scenario, WristSettings, TipSettings):
     """Passive wrist emulation (section 3 of the paper) under a scripted task."""
 
     measure_from: float = parameter(

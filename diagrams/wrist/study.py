@@ -3,7 +3,7 @@
 from typing import Any
 
 from diagrams.bedside.bedside import stiffen
-from diagrams.bedside.wrist import WRIST_SIGNALS, check_wrist
+from diagrams.bedside.wrist import check_wrist, wrist_signals
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
@@ -14,7 +14,7 @@ from plants.abdomen.wall_force import FulcrumError
 from systems.common.signals import Force, RobotTool
 from systems.motion.joint_commands import Status
 
-SIGNALS = WRIST_SIGNALS | {
+SIGNALS = {
     "robot.tool": RobotTool,
     "joints.status": Status,
     "wall.force": Force,
@@ -33,7 +33,7 @@ STUDY = Study(
     make_diagram=lambda case: make_wrist_diagram(case.scenario),
     check=check_wrist,
     measure=measure,
-    signals=lambda scenario: SIGNALS,
+    signals=lambda scenario: SIGNALS | wrist_signals(scenario),
     log_period=1.0 / 120.0,
     plots=plots,
     decorate=decorate_wrist,

@@ -6,7 +6,8 @@ freely only the part across the shaft is left at rest:
 
     f = -K (p_c - I)_perp - D d/dt (p_c - I)_perp
 
-is what the wall does to the shaft, p_c being the shaft's point nearest the fulcrum
+and, where the trocar resists tilting, a torque -k phi, phi from the wall's normal, is
+what the wall does to the shaft, p_c being the shaft's point nearest the fulcrum
 I. Along the shaft there is only the seal's friction, 0.25 to 3 N in the literature,
 most of it dry. Lateral trocar stiffness was not found in vivo: sweep 100 to 3000 N/m.
 """
@@ -33,6 +34,8 @@ from systems.common.compiled import compiled
 from systems.common.geometry import Pose, Vector, along, cross, scaled
 from systems.common.parameter import check, parameter
 
+TURNING_DAMPING = 0.02
+"""Of a trocar's resistance to tilting, for its stiffness, in s."""
 _SEAL_VISCOSITY = 1e4
 """Slope of the seal's friction about zero speed, in N s/m: full friction is reached
 at 0.1 mm/s per newton."""
@@ -44,6 +47,10 @@ class AbdomenParams:
 
     stiffness: float = parameter(
         500.0, "K, lateral, of the trocar; 100 to 3000", "N/m", least=10, most=2e4
+    )
+    # Not found in vivo; a thick wall and a tight seal hold the cannula's direction.
+    turning_stiffness: float = parameter(
+        0.0, "of the trocar against tilting, 0 to 1", "N m/rad", least=0, most=5
     )
     # Over 10, CENIC needs more steps, or a heavier sleeve.
     damping: float = parameter(5.0, "D", "N s/m", least=0, most=100)
@@ -156,8 +163,8 @@ def add_abdomen(
         LinearBushingRollPitchYaw(
             fulcrum,
             sleeve.body_frame(),
-            [0.0] * 3,
-            [0.0] * 3,
+            [params.turning_stiffness, params.turning_stiffness, 0.0],
+            [TURNING_DAMPING * params.turning_stiffness] * 2 + [0.0],
             [params.stiffness] * 3,
             [params.damping] * 3,
         )

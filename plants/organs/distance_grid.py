@@ -208,8 +208,7 @@ def build(surface: Surface, name: str, spacing: float = SPACING) -> DistanceGrid
         size = spacing * np.ptp(wrong, axis=0).max()
         raise SurfaceError(
             f"{name}: it crosses itself in {len(wrong)} voxels about {in_mm(middle)}, "
-            f"within {1e3 * size:.0f} mm: expected a surface that encloses once; mend: "
-            "true tries to make one of it"
+            f"within {1e3 * size:.0f} mm: expected a surface that encloses once"
         )
     far = np.full(shape, np.inf, np.float32)
     points = (surface.points - low) / spacing

@@ -8,7 +8,15 @@ changes by
 
 It is held above D_safe by A . v >= n . v_O(M_O) - gamma (rho - D_safe), for every
 obstacle tool, together with the tip's and the turning speed and the borders of the
-workspace; v is the nearest velocity to the wanted one.
+workspace; v is the nearest velocity to the wanted one. Above the wall the shafts go on,
+and may meet there: for the parts outside s and l/L are negative, and all else holds.
+Trocars that breathe move R by (1 - s) of their velocity and O by (1 - l/L) of it.
+
+*What gives way.* First of all no tool is touched; then the wall is not loaded, which is
+the speeds, insertion and tilt that the trocar and the arm allow; then R's tip stays in
+view; then it goes where the planner wants. Where all cannot be had, the view is left,
+and port ``status`` says so; where even that will not do, the tools' rows come as near
+to their bounds as the limits of the trocar permit.
 
 *The promise and its condition.* If rho >= D_safe at the start and at every instant n .
 v_O(M_O) <= e, e being the greatest A . v that the speeds and the workspace allow, the
@@ -19,7 +27,8 @@ whether the condition holds while a tool is near enough to matter.
 
 *Dodge.* If a tool closes on the inside of the shaft with more than 0.6 e and there is
 little time left to pull the tip out of its way, R retracts until it closes with less
-than 0.4 e or the time is ample.
+than 0.4 e or the time is ample. So it does if a tool
+that is slow enough drives it into a border of the workspace, where evasion ends.
 
 Braking: the closing speed allowed falls as gamma (rho - D_safe), so the deceleration
 asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_O).
@@ -27,7 +36,8 @@ asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from math import exp, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +48,7 @@ from systems.bypass import workspace as limits
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
 from systems.bypass.organ_rows import organ_rows
 from systems.bypass.shadow_body import ObstacleTool, read_tool
-from systems.bypass.workspace import WorkspaceParams, borders
+from systems.bypass.workspace import VIEW, WorkspaceParams, borders
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     all_finite,
@@ -48,19 +58,25 @@ from systems.common.geometry import (
     closest_points,
     cross,
     dot,
+    limited,
     norm,
+    over,
+    row_of,
     scaled,
     set_row,
     shaft_point_velocity,
     sub,
     unit,
+    xyz,
 )
 from systems.common.parameter import Rules, check, parameter
-from systems.common.projection import greatest_rate, nearest_velocity
-from systems.common.reach_limits import ReachLimits
-from systems.common.signal import Field, Many, Vector
+from systems.common.projection import greatest_rate, most_missed, nearest_velocity
+from systems.common.reach_limits import ReachLimits, lever
+from systems.common.signal import Many, Vector
 from systems.common.signals import (
+    CALM,
     FREE,
+    ClearanceStatus,
     Estimate,
     Guide,
     Permission,
@@ -79,21 +95,16 @@ _PARALLEL = 0.2
 """Sine of the angle below which a tip's own distance is constrained as well."""
 _OUTWARDS = 0.05
 """Share of insertion in A above which retracting would bring R nearer to the tool."""
+_TROCAR = 6
+"""Numbers that are kept of a trocar."""
+_JUMP = 0.005
+"""No trocar moves so far in a step, m."""
+_FASTEST_TROCAR = 0.03
+"""Nor so fast, m/s."""
+_CLOSING = 0.004
+"""A tool that closes more slowly is not dodged, m/s: it may be the tracker's noise."""
 _MISSED = 1e-3
 """A row is missed by more than the solver's own error, m/s."""
-
-
-class ClearanceStatus(NamedTuple):
-    """What the constraint sees and does."""
-
-    room: Annotated[float, Field("m", "the least rho - D_safe", 0.02)]
-    near: Annotated[float, Field("1", "1 while a tool is near, else 0", 0.0)]
-    condition: Annotated[
-        float, Field("1", "1 while evasion can keep it for all that are near", 1.0)
-    ]
-    dodge: Annotated[float, Field("1", "1 while R dodges, else 0", 0.0)]
-    change: Annotated[float, Field("m/s", "of the tip's velocity", 0.0)]
-    missed: Annotated[float, Field("m/s", "by how much a row is missed", 0.0)]
 
 
 @dataclass
@@ -104,11 +115,20 @@ class ClearanceConstraintParams:
         True, "if not, the velocity passes unchanged; the status is still given"
     )
     period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
+    # The planner's own speed is lower. A PA-10's joints allow this in the middle of
+    # its workspace; where they do not, the tip lags and the fulcrum is kept.
     max_speed: float = parameter(
-        0.1, "v_max that evasion may use", "m/s", above=0.0, most=0.5
+        0.25, "v_max that evasion may use", "m/s", above=0.0, most=0.5
     )
     turning_speed: float = parameter(
         1.0, "omega_max of the shaft", "rad/s", above=0.0, most=10.0
+    )
+    acceleration: float = parameter(
+        4.0,
+        "of the tip in evasion, that dodging reckons with",
+        "m/s^2",
+        least=0.1,
+        most=20.0,
     )
     rate: float = parameter(
         4.0, "gamma; at most a_max / (v_max + V_O)", "1/s", least=0.1, most=60.0
@@ -121,6 +141,20 @@ class ClearanceConstraintParams:
         most=0.5,
     )
     dodge: bool = parameter(True, "whether to dodge")
+    drift_time: float = parameter(
+        0.0,
+        "over which the trocars' own velocities are found; 0: they stand",
+        "s",
+        least=0.0,
+        most=5.0,
+    )
+    outside: float = parameter(
+        0.3,
+        "length of the shafts outside the body that counts; 0: none",
+        "m",
+        least=0.0,
+        most=0.6,
+    )
 
     def rules(self) -> Rules:
         """What must hold across the parameters."""
@@ -142,18 +176,30 @@ class DistanceRate(NamedTuple):
         s: Proportion of R's inserted length at which it is.
         A: What the velocity of R's tip does.
         c: What the tool itself does, m/s.
+        n: Unit vector from the tool to R.
+        l_over_L: Proportion of the tool's inserted length at which it is.
     """
 
     rho: float
     s: float
     A: Vector
     c: float
+    n: Vector
+    l_over_L: float
+
+
+@compiled
+def drifting(rate: DistanceRate, v_G: Vector, v_GO: Vector) -> DistanceRate:
+    """The same for trocars that move: R's at v_G, the tool's at v_GO, m/s."""
+    own = (1.0 - rate.s) * dot(rate.n, v_G)
+    closing = rate.c + (1.0 - rate.l_over_L) * dot(rate.n, v_GO) - own
+    return DistanceRate(rate.rho, rate.s, rate.A, closing, rate.n, rate.l_over_L)
 
 
 @compiled
 def leverage(s: float, n: Vector, u: Vector) -> Vector:
     """A for the proportion s of R along u; a fulcrum is no material point."""
-    if s <= 0.0:
+    if s == 0.0:
         return 0.0, 0.0, 0.0
     return along(scaled(s, n), (1.0 - s) * dot(n, u), u)
 
@@ -170,7 +216,26 @@ def distance_rate(g: Vector, p: Vector, tool: ObstacleTool) -> DistanceRate:
     closing = 0.0
     if near.t > 0.0:
         closing = dot(n, shaft_point_velocity(near.t, o, tool.v))
-    return DistanceRate(near.distance, near.s, leverage(near.s, n, u), closing)
+    return DistanceRate(
+        near.distance, near.s, leverage(near.s, n, u), closing, n, near.t
+    )
+
+
+@compiled
+def outer_rate(
+    g: Vector, p: Vector, tool: ObstacleTool, outside: float
+) -> DistanceRate:
+    """The same above the wall, for `outside` m of both shafts: s is negative there."""
+    shaft, other = sub(p, g), sub(tool.tip, tool.fulcrum)
+    u, o = unit(shaft), unit(other)
+    ends = along(g, -outside, u), along(tool.fulcrum, -outside, o)
+    near = closest_points(g, ends[0], tool.fulcrum, ends[1])
+    n = unit(sub(near.p_A, near.p_B), unit(cross(u, o), any_perpendicular(u)))
+    s, l_over_L = -near.s * outside / norm(shaft), -near.t * outside / norm(other)
+    closing = 0.0
+    if near.t > 0.0:
+        closing = dot(n, shaft_point_velocity(l_over_L, o, tool.v))
+    return DistanceRate(near.distance, s, leverage(s, n, u), closing, n, l_over_L)
 
 
 @compiled
@@ -191,10 +256,38 @@ def tip_rates(
     t, rho = closest_on_segment(p, a, p_o)
     n = unit(sub(p, along(a, t, sub(p_o, a))), aside)
     closing = dot(n, shaft_point_velocity(t, o, tool.v)) if t > 0.0 else 0.0
-    own = DistanceRate(rho, 1.0, n, closing)
+    own = DistanceRate(rho, 1.0, n, closing, n, t)
     s, rho = closest_on_segment(p_o, g, p)
     n = unit(sub(along(g, s, sub(p, g)), p_o), aside)
-    return own, DistanceRate(rho, s, leverage(s, n, u), dot(n, tool.v))
+    return own, DistanceRate(rho, s, leverage(s, n, u), dot(n, tool.v), n, 1.0)
+
+
+@compiled
+def withdrawal_time(params: Any, way: float) -> float:
+    """Time in s to pull the tip back by `way`, m, from rest."""
+    ramp = 0.5 * params.max_speed**2 / params.acceleration
+    if way <= ramp:
+        return sqrt(2.0 * max(0.0, way) / params.acceleration)
+    return way / params.max_speed + 0.5 * params.max_speed / params.acceleration
+
+
+@compiled
+def driven_time(rate: DistanceRate, normals: np.ndarray, room: np.ndarray) -> float:
+    """Time in s until a tool that R gives way to has driven its tip into a border.
+
+    Args:
+        rate: Of the distance to the tool.
+        normals: Of the borders, inwards (n, 3).
+        room: Before each, m (n).
+    """
+    left, square = 1e9, dot(rate.A, rate.A)
+    if square < 1e-12:
+        return 0.0
+    for k in range(len(room)):
+        outwards = -rate.c * dot(row_of(normals, k), rate.A) / square
+        if outwards > 1e-6:
+            left = min(left, max(0.0, room[k]) / outwards)
+    return left
 
 
 @compiled
@@ -206,12 +299,26 @@ def must_dodge(
     safe: float,
     outwards: float,
     evasion: float,
+    driven: float,
 ) -> bool:
-    """Whether R retracts from a tool that sweeps the inside of its shaft."""
-    if outwards > _OUTWARDS or rate.c <= (0.4 if is_dodging else 0.6) * evasion:
+    """Whether R retracts from a tool that sweeps the inside of its shaft.
+
+    Args:
+        params: A record of `constants`.
+        is_dodging: Whether it does already.
+        q: Insertion, m.
+        rate: Of the distance to the tool.
+        safe: D_safe, m.
+        outwards: Share of insertion in A.
+        evasion: e, m/s.
+        driven: See `driven_time`.
+    """
+    if outwards > _OUTWARDS or rate.c <= (0.5 if is_dodging else 1.0) * _CLOSING:
         return False
-    left = max(0.0, rate.rho - safe) / max(rate.c, 1e-6)
-    needed = (q - (rate.s * q - safe)) / params.max_speed
+    left = max(0.0, rate.rho - safe) / rate.c
+    if rate.c <= (0.4 if is_dodging else 0.6) * evasion:
+        left += driven
+    needed = withdrawal_time(params, q - (rate.s * q - safe))
     return left < 1.5 * needed + 0.3
 
 
@@ -231,6 +338,7 @@ def constrain(
     wanted: Vector,
     tools: np.ndarray,
     dodging: np.ndarray,
+    drift: np.ndarray,
     organs: Organs | None = None,
 ) -> tuple[Vector, np.ndarray, ClearanceStatus]:
     """One step: the tip's velocity nearest to the wanted one that is safe.
@@ -244,6 +352,7 @@ def constrain(
         wanted: The tip's wanted velocity, m/s.
         tools: Rows of `ObstacleTool`.
         dodging: Whether R dodges each of them, 1 or 0; as many or more.
+        drift: Velocities of R's trocar and of theirs, rows, m/s; one more.
         organs: What else to keep clear of; None is compiled away.
 
     Returns:
@@ -251,9 +360,10 @@ def constrain(
     """
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft)
-    turning = q * params.turning_speed
+    turning = min(q * params.turning_speed, lever(workspace, q) * workspace.wrist_speed)
     dodges = np.zeros(len(dodging))
     least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
+    escape, blind = 0.0, 0.0
     near = params.obstacle_speed / params.rate
     inwards, room = borders(workspace, view_cone, g, p)
     # A tip that is outside comes back no faster than it may go at all.
@@ -261,35 +371,50 @@ def constrain(
     further, least_rates = inwards, returning
     if organs is not None:
         organs_inwards, organs_returning = organ_rows(params, organs, g, p)
-        further = np.concatenate((inwards, organs_inwards))
-        least_rates = np.concatenate((returning, organs_returning))
-    most = 3 * len(tools) + len(least_rates)
+        further = np.concatenate((organs_inwards, inwards))
+        least_rates = np.concatenate((organs_returning, returning))
+    most = 4 * len(tools) + len(least_rates)
     rows, bounds = np.empty((most, 3)), np.empty(most)
     last = 0
     for i in range(len(tools)):
         tool = read_tool(tools[i])
-        rate = distance_rate(g, p, tool)
+        v_G, v_GO = row_of(drift, 0), row_of(drift, 1 + i)
+        rate = drifting(distance_rate(g, p, tool), v_G, v_GO)
         evasion = greatest_rate(rate.A, u, params.max_speed, turning)
         least = min(least, rate.rho - tool.safe)
         if rate.rho - tool.safe < near:
             far = scaled(100.0 * params.max_speed, rate.A)
             best, _ = nearest_velocity(
-                far, inwards, returning, u, params.max_speed, turning
+                far, inwards[:VIEW], returning[:VIEW], u, params.max_speed, turning
             )
             evasion = max(0.0, min(evasion, dot(rate.A, best)))
             is_near = 1.0
             if rate.c > evasion:
                 holds = 0.0
-        outwards = dot(rate.A, u)
         if params.dodge and must_dodge(
-            params, dodging[i] > 0.5, q, rate, tool.safe, outwards, evasion
+            params,
+            dodging[i] > 0.5,
+            q,
+            rate,
+            tool.safe,
+            dot(rate.A, u),
+            evasion,
+            driven_time(rate, inwards[:VIEW], room[:VIEW]),
         ):
             dodge = dodges[i] = 1.0
         set_row(rows, last, rate.A)
         bounds[last] = least_rate(params, rate, tool.safe, evasion)
         last += 1
+        if params.outside > 0.0:
+            outer = drifting(outer_rate(g, p, tool, params.outside), v_G, v_GO)
+            evasion = greatest_rate(outer.A, u, params.max_speed, turning)
+            least = min(least, outer.rho - tool.safe)
+            set_row(rows, last, outer.A)
+            bounds[last] = least_rate(params, outer, tool.safe, evasion)
+            last += 1
         if are_parallel(g, p, tool):
-            for end in tip_rates(g, p, tool):
+            for still in tip_rates(g, p, tool):
+                end = drifting(still, v_G, v_GO)
                 evasion = greatest_rate(end.A, u, params.max_speed, turning)
                 set_row(rows, last, end.A)
                 bounds[last] = least_rate(params, end, tool.safe, evasion)
@@ -297,18 +422,57 @@ def constrain(
     if dodge > 0.5:
         wanted = scaled(-params.max_speed, u)
     if params.active:
+        hurried = most_missed(wanted, rows[:last], bounds[:last])
+        if dodge > 0.5 or hurried > _MISSED:
+            escape = 1.0
         count = last + len(least_rates)
         rows[last:count], bounds[last:count] = further, least_rates
         v, missed = nearest_velocity(
             wanted, rows[:count], bounds[:count], u, params.max_speed, turning
         )
+        if dodge > 0.5 or missed > _MISSED:
+            # The view, the last row, gives way.
+            count -= 1
+            v, missed = nearest_velocity(
+                wanted, rows[:count], bounds[:count], u, params.max_speed, turning
+            )
+            if dot(inwards[VIEW], v) < returning[VIEW] - _MISSED:
+                escape = blind = 1.0
         change = norm(sub(v, wanted))
         # Several tools and organs may ask for what cannot be had together.
         if missed > _MISSED:
             holds = 0.0
         wanted = v
-    status = ClearanceStatus(least, is_near, holds, dodge, change, missed)
+    status = ClearanceStatus(
+        least, is_near, holds, dodge, change, missed, escape, blind
+    )
     return wanted, dodges, status
+
+
+@compiled
+def trocar_drift(
+    params: Any, places: np.ndarray, g: Vector, tools: np.ndarray
+) -> np.ndarray:
+    """Where the trocars are and how fast they move, smoothed: rows of six, m and m/s.
+
+    Args:
+        params: A record of `constants`.
+        places: The same of the last step, R's first; as many as tools and one, or more.
+        g: Fulcrum G_R, m.
+        tools: Rows of `ObstacleTool`.
+    """
+    share, after = 1.0 - exp(-params.period / params.drift_time), places.copy()
+    for i in range(1 + len(tools)):
+        place = g if i == 0 else read_tool(tools[i - 1]).fulcrum
+        before, v = xyz(places[i], 0), xyz(places[i], 3)
+        way = sub(place, before)
+        if norm(way) > _JUMP:  # another tool, or the first of it
+            v = (0.0, 0.0, 0.0)
+        else:
+            v = along(v, share, sub(over(way, params.period), v))
+        after[i, 0], after[i, 1], after[i, 2] = place
+        after[i, 3], after[i, 4], after[i, 5] = limited(v, _FASTEST_TROCAR)
+    return after
 
 
 @compiled
@@ -317,7 +481,7 @@ def hold(
     margins: Any,
     workspace: Any,
     organs: Organs | None,
-    dodging: np.ndarray,
+    known: np.ndarray,
     v_R: Velocity,
     guide: Guide,
     robot: RobotTool,
@@ -329,14 +493,19 @@ def hold(
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
     """One step of the block, among organs or, None, without."""
     v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
-    known = all_usable(obstacles) and usable(target)
     numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
-    if not (known and numbers):
-        nothing = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return np.zeros(len(dodging)), Velocity(v), nothing
+    if not (all_usable(obstacles) and numbers):
+        return np.zeros(len(known)), Velocity(v), CALM
     g, s = robot.fulcrum, guide.s
     tools = obstacle_tools(margins, g, obstacles, target, camera)
+    count = len(known) // (1 + _TROCAR)
+    after = known.copy()
+    places = after[count:].reshape((count, _TROCAR))
+    if params.drift_time > 0.0:
+        places[:] = trocar_drift(params, places, g, tools)
     share = max(0.0, min(1.0, permission.speed_scale)) / s
+    if not usable(target):  # nowhere to go, but out of the others' way
+        share = 0.0
     v, dodges, status = constrain(
         params,
         workspace,
@@ -345,10 +514,12 @@ def hold(
         robot.tip,
         scaled(share, v),
         tools,
-        dodging,
+        known[: count - 1],
+        places[:, 3:],
         organs,
     )
-    return dodges, Velocity(scaled(s, v)), status
+    after[: count - 1] = dodges
+    return after, Velocity(scaled(s, v)), status
 
 
 @compiled
@@ -356,7 +527,7 @@ def _step(
     params: Any,
     margins: Any,
     workspace: Any,
-    dodging: np.ndarray,
+    state: np.ndarray,
     v_R: Velocity,
     guide: Guide,
     robot: RobotTool,
@@ -367,7 +538,7 @@ def _step(
     permission: Permission,
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
     known = (robot, obstacles, target, camera, view_cone, permission)
-    return hold(params, margins, workspace, None, dodging, v_R, guide, *known)
+    return hold(params, margins, workspace, None, state, v_R, guide, *known)
 
 
 @compiled
@@ -377,7 +548,7 @@ def _step_among(
     workspace: Any,
     values: np.ndarray,
     table: np.ndarray,
-    dodging: np.ndarray,
+    state: np.ndarray,
     v_R: Velocity,
     guide: Guide,
     robot: RobotTool,
@@ -390,16 +561,16 @@ def _step_among(
 ) -> tuple[np.ndarray, Velocity, ClearanceStatus]:
     organs = Organs(values, table, moved)
     known = (robot, obstacles, target, camera, view_cone, permission)
-    return hold(params, margins, workspace, organs, dodging, v_R, guide, *known)
+    return hold(params, margins, workspace, organs, state, v_R, guide, *known)
 
 
 class ClearanceConstraint(StepBlock):
     """Holds a hard clearance to the surgeon's tools under any planner.
 
-    After the fuzzy sum, before the tool's navigation; see the module. While an estimate
-    is not usable or an input is not finite the velocity passes as it is: then the
-    arbiter slows R down and the navigation stops it. A wanted velocity that is not
-    finite counts as zero.
+    After the fuzzy sum, before the tool's navigation; see the module. While an
+    obstacle's estimate is not usable or an input is not finite the velocity passes as
+    it is: then the arbiter slows R down and the navigation stops it. While S is lost R
+    only evades. A wanted velocity that is not finite counts as zero.
 
     Port ``v_R`` accepts the wanted `Velocity` of the guide point.
     Port ``guide`` accepts the `Guide`, of which s is used.
@@ -414,7 +585,8 @@ class ClearanceConstraint(StepBlock):
     Port ``v_safe`` emits the `Velocity` of the guide point.
     Port ``status`` emits the `ClearanceStatus`.
 
-    The discrete state is whether R dodges each tool: the obstacles, S, the endoscope.
+    The discrete state is whether R dodges each tool, the obstacles, S, the endoscope,
+    and where R's trocar and theirs are and how fast they move.
     """
 
     def __init__(
@@ -460,7 +632,7 @@ class ClearanceConstraint(StepBlock):
                 "permission": Permission,
                 **port(organs),
             },
-            np.zeros(len(obstacles) + 2),
+            np.zeros((len(obstacles) + 3) * (1 + _TROCAR)),
             {"v_safe": Velocity, "status": ClearanceStatus},
             params.period,
             timed=False,

@@ -166,13 +166,13 @@ def obstacle_tools(
         margins: A record of `constants`.
         g: Fulcrum G_R, m.
         obstacles: Estimates (n, 17), usable.
-        target: Of S, usable.
+        target: Of S.
         camera: Of the endoscope.
     """
     count = len(obstacles)
     rows = np.empty((count + 2, COLUMNS))
     rows[:count] = tool_rows(margins, obstacles)
-    if margins.avoid_target:
+    if margins.avoid_target and usable(target):
         is_left, shaft = target_shaft(margins, g, target)
         if is_left:
             write_tool(rows, count, shaft)

@@ -25,6 +25,10 @@ from systems.common.signal import Vector
 from systems.common.signals import ViewCone
 
 _DOWN = (0.0, 0.0, -1.0)
+BORDERS = 5
+"""How many there are."""
+VIEW = 4
+"""Place of the view cone's, the last: it is the first to give way."""
 
 
 @dataclass
@@ -49,6 +53,9 @@ def constants(
         max_insertion=limits.max_insertion,
         max_tilt=limits.max_tilt,
         cone_margin=limits.cone_margin,
+        wrist_speed=limits.wrist_speed,
+        wrist_acceleration=limits.wrist_acceleration,
+        shaft_length=limits.shaft_length,
     )
 
 
@@ -167,21 +174,21 @@ def borders(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The borders near the tip: inward normals (5, 3) and the room before each, m (5).
 
-    Least and greatest insertion, tilt, view cone, floor. A border that does not exist
+    Least and greatest insertion, tilt, floor, view cone. A border that does not exist
     has room without end.
     """
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft, _DOWN)
     tilt, tilt_room = cone_border(tilt_cone(workspace, g), p)
     view, view_room = cone_border(narrowed(workspace, view_cone), p)
-    normals = np.array((u, scaled(-1.0, u), tilt, view, scaled(-1.0, _DOWN)))
+    normals = np.array((u, scaled(-1.0, u), tilt, scaled(-1.0, _DOWN), view))
     room = np.array(
         (
             q - workspace.min_insertion,
             workspace.max_insertion - q,
             tilt_room,
-            view_room,
             p[2] - workspace.floor,
+            view_room,
         )
     )
     return normals, room

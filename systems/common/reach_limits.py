@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 from math import pi
+from typing import Any
 
+from systems.common.compiled import compiled
 from systems.common.parameter import Rules, parameter
 
 
@@ -31,6 +33,19 @@ class ReachLimits:
         most=0.5,
     )
 
+    # The less of the shaft is inside, the wider is its other end's way.
+    wrist_speed: float = parameter(
+        0.25,
+        "of the shaft's outer end, which turning asks of the arm",
+        "m/s",
+        above=0.0,
+        most=100.0,
+    )
+    wrist_acceleration: float = parameter(5.0, "likewise", "m/s^2", above=0.0, most=1e3)
+    shaft_length: float = parameter(
+        0.4, "from the outer end to the tip", "m", above=0.0, most=1.0
+    )
+
     def rules(self) -> Rules:
         """What must hold across the limits."""
         yield (
@@ -38,3 +53,14 @@ class ReachLimits:
             "min_insertion",
             f"less than max_insertion={self.max_insertion} m",
         )
+
+
+@compiled
+def lever(limits: Any, q: float) -> float:
+    """How far the tip goes sideways for the wrist's way, q, m, of the shaft inside.
+
+    Args:
+        limits: A record with what `ReachLimits` says.
+        q: In m.
+    """
+    return q / max(limits.shaft_length - q, 0.01)

@@ -94,6 +94,27 @@ FREE = Permission(1.0, 0.0)
 """What the passive wrist permits where there is none."""
 
 
+class ClearanceStatus(NamedTuple):
+    """What the constraint sees and does."""
+
+    room: Annotated[float, Field("m", "the least rho - D_safe", 0.02)]
+    near: Annotated[float, Field("1", "1 while a tool is near, else 0", 0.0)]
+    condition: Annotated[
+        float, Field("1", "1 while evasion can keep it for all that are near", 1.0)
+    ]
+    dodge: Annotated[float, Field("1", "1 while R dodges, else 0", 0.0)]
+    change: Annotated[float, Field("m/s", "of the tip's velocity", 0.0)]
+    missed: Annotated[float, Field("m/s", "by how much a row is missed", 0.0)]
+    escape: Annotated[
+        float, Field("1", "1 while a tool leaves the planner no choice, else 0", 0.0)
+    ]
+    blind: Annotated[float, Field("1", "1 while the view gives way to it", 0.0)]
+
+
+CALM = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+"""Of a constraint that sees nothing."""
+
+
 class Point(NamedTuple):
     """A point."""
 

@@ -88,7 +88,7 @@ class CameraPlannerParams:
     working_distance: float = parameter(
         0.02, "of the tips, within it R is at S", "m", least=0.0, most=0.1
     )
-    horizon: float = parameter(1.4, "it looks ahead", "s", least=0.0, most=5.0)
+    horizon: float = parameter(0.8, "it looks ahead", "s", least=0.0, most=5.0)
     clearance: float = parameter(
         0.004, "of its own shaft from organs and tools", "m", least=0.0, most=0.03
     )
@@ -193,12 +193,11 @@ def best_place(
                 if not is_better:
                     continue
                 half = scaled(0.5, plus(place, p))
-                if (
-                    least_margin(
-                        _seen_from(scope, half), p_R, p_S, shafts, later, organs, enough
-                    )
-                    <= 0.0
-                ):
+                # On the way, when it will be half done: is a tip lost from sight?
+                done = 0.5 * way / scope.max_speed / max(params.horizon, 1e-3)
+                then = shafts + min(1.0, done) * (later - shafts)
+                seen = _seen_from(scope, half)
+                if least_margin(seen, p_R, p_S, then, then, organs, enough) <= 0.0:
                     way *= _HIDDEN
                     if most >= enough and way >= least:
                         continue

@@ -32,10 +32,12 @@ from systems.common.geometry import (
     unit,
 )
 from systems.common.parameter import Rules, check, parameter
-from systems.common.reach_limits import ReachLimits
+from systems.common.reach_limits import ReachLimits, lever
 from systems.common.signal import Field, Many, Vector, example, vector
 from systems.common.signals import (
+    CALM,
     FREE,
+    ClearanceStatus,
     Estimate,
     Guide,
     Permission,
@@ -87,6 +89,13 @@ class ToolNavigationParams(ReachLimits):
         above=0.0,
         most=1.0,
     )
+    # As fast as a PA-10's joints allow; it turns no faster, its base does not.
+    escape_speed: float = parameter(
+        0.25, "of the tip, out of a tool's way", "m/s", above=0.0, most=0.5
+    )
+    escape_acceleration: float = parameter(
+        4.0, "of the tip, out of a tool's way", "m/s^2", above=0.0, most=20.0
+    )
     follow_error: float = parameter(
         0.01,
         "largest distance of the measured from the commanded tip",
@@ -99,6 +108,11 @@ class ToolNavigationParams(ReachLimits):
         """What must hold across the parameters."""
         yield from super().rules()
         yield self.max_tilt < math.pi / 2, "max_tilt", "< pi/2; is it in degrees?"
+        for name, least in (
+            ("escape_speed", self.tip_speed),
+            ("escape_acceleration", self.acceleration),
+        ):
+            yield getattr(self, name) >= least, name, f"at least {least}"
 
 
 def constants(params: ToolNavigationParams) -> np.ndarray:
@@ -128,8 +142,23 @@ def cone_angle(view_cone: ViewCone, p_WP: Vector) -> float:
     return math.acos(min(1.0, max(-1.0, cosine)))
 
 
+class Pace(NamedTuple):
+    """How fast the tip may go: m/s, m/s^2."""
+
+    speed: float
+    acceleration: float
+
+
 @compiled
-def held(params: Any, v: Vector, n: Vector, room: float) -> Vector:
+def pace(params: Any, escapes: bool) -> Pace:
+    """That of travelling, or of an escape."""
+    if escapes:
+        return Pace(params.escape_speed, params.escape_acceleration)
+    return Pace(params.tip_speed, params.acceleration)
+
+
+@compiled
+def held(params: Any, v: Vector, n: Vector, room: float, braking: float) -> Vector:
     """A tip velocity before a border: what leads outwards too fast is taken away.
 
     Args:
@@ -137,17 +166,23 @@ def held(params: Any, v: Vector, n: Vector, room: float) -> Vector:
         v: Velocity [m/s].
         n: The border's outward normal.
         room: How far it is to the border [m].
+        braking: Greatest acceleration [m/s^2].
     """
     room = max(0.0, room)
     # What can still be braked, and no more than the room itself in a period.
-    allowed = min(math.sqrt(params.acceleration * room), room / params.period)
+    allowed = min(math.sqrt(braking * room), room / params.period)
     excess = dot(v, n) - allowed
     return along(v, -excess, n) if excess > 0.0 else v
 
 
 @compiled
 def limit_tip_velocity(
-    params: Any, p_WG: Vector, p_WP: Vector, v_WP: Vector, view_cone: ViewCone
+    params: Any,
+    p_WG: Vector,
+    p_WP: Vector,
+    v_WP: Vector,
+    view_cone: ViewCone,
+    escapes: bool = False,
 ) -> Vector:
     """Brings a tip velocity within the tool's limits.
 
@@ -160,10 +195,12 @@ def limit_tip_velocity(
         p_WP: Tip in W [m].
         v_WP: Wanted velocity of the tip in W [m/s].
         view_cone: What the endoscope sees.
+        escapes: Whether a tool comes: then it may be faster, and leave the view.
 
     Returns:
         The limited velocity in W [m/s].
     """
+    fastest, braking = pace(params, escapes)
     shaft = sub(p_WP, p_WG)
     q = norm(shaft)
     u = unit(shaft, _DOWN)
@@ -171,28 +208,31 @@ def limit_tip_velocity(
     lengthwise = dot(v_WP, u)
     turning = math.sqrt(max(0.0, speed * speed - lengthwise * lengthwise))
     scale = 1.0
-    if speed > params.tip_speed:
-        scale = params.tip_speed / speed
-    if turning * scale > params.turning_speed * q:
-        scale = params.turning_speed * q / turning
+    if speed > fastest:
+        scale = fastest / speed
+    most = min(q * params.turning_speed, lever(params, q) * params.wrist_speed)
+    if turning * scale > most:
+        scale = most / turning
     v = scaled(scale, v_WP)
     # Each border is a half-space: outward normal and the room left before it.
-    v = held(params, v, u, params.max_insertion - q)
-    v = held(params, v, scaled(-1.0, u), q - params.min_insertion)
+    v = held(params, v, u, params.max_insertion - q, braking)
+    v = held(params, v, scaled(-1.0, u), q - params.min_insertion, braking)
     x, y, z = u
     tilt = math.acos(min(1.0, max(-1.0, -z)))
     lateral = (x, y, 0.0)
     if norm(lateral) > 1e-6:
         # The direction in which the tip tilts further, perpendicular to the shaft.
         outwards = along(scaled(math.cos(tilt), unit(lateral)), -math.sin(tilt), _DOWN)
-        v = held(params, v, outwards, (params.max_tilt - tilt) * q)
+        v = held(params, v, outwards, (params.max_tilt - tilt) * q, braking)
+    if escapes:
+        return v
     ray = sub(p_WP, view_cone.apex)
     off = unit(across(unit(ray, _DOWN), view_cone.u), _DOWN)
     half = view_cone.half - params.cone_margin
     # The cone's outward normal: off axis, tilted back by the half angle.
     outwards = along(scaled(math.cos(half), off), -math.sin(half), view_cone.u)
     room = norm(ray) * math.sin(half - cone_angle(view_cone, p_WP))
-    return held(params, v, outwards, room)
+    return held(params, v, outwards, room, braking)
 
 
 @compiled
@@ -233,6 +273,23 @@ def why_stop(
 
 
 @compiled
+def evades(reason: Stop, code: float) -> bool:
+    """Whether a tool that must stand still gets out of another one's way.
+
+    Not if it does not know where the tools are or where it is itself, and not while
+    the arm gives way to a loaded wall.
+    """
+    if reason == Stop.MOVING:
+        return code == float(Stop.PROBING.value)
+    return reason in (
+        Stop.TARGET_LOST,
+        Stop.OUT_OF_REACH,
+        Stop.OUT_OF_VIEW,
+        Stop.NOT_FOLLOWED,
+    )
+
+
+@compiled
 def _update(
     params: Any,
     tool: ToolMotion,
@@ -245,24 +302,34 @@ def _update(
     target: Estimate,
     view_cone: ViewCone,
     permission: Permission,
+    clearance: ClearanceStatus,
 ) -> tuple[ToolMotion, StopCode]:
     # The tip has moved on since the last instant.
     p = along(tool.tip, time - tool.time, tool.v)
+    escapes = 0.5 < clearance.escape < 2.0
     reason = why_stop(
         params, v_R, guide, robot, obstacles, target, view_cone, permission, p
     )
     code, moves = float(reason.value), reason == Stop.MOVING
     if moves and permission.speed_scale <= 0.0:
         code, moves = permission.code, False
+    if escapes and not moves and evades(reason, code):
+        # It stands where it was told to go, not where a tool comes.
+        moves = True
+        p = plus(robot.tip, limited(sub(p, robot.tip), params.follow_error))
     p_WG = robot.fulcrum if all_finite(robot.fulcrum) else sub(p, tool.u)
     wanted = (0.0, 0.0, 0.0)
     if moves:
         wanted = over(v_R.v, max(guide.s, params.min_proportion))
-        wanted = limit_tip_velocity(params, p_WG, p, wanted, view_cone)
-    change = limited(sub(wanted, tool.v), params.acceleration * params.period)
-    v = plus(tool.v, change)
+        wanted = limit_tip_velocity(params, p_WG, p, wanted, view_cone, escapes)
     shaft = sub(p, p_WG)
     u = unit(shaft, _DOWN)
+    hardest = pace(params, escapes).acceleration
+    change = limited(sub(wanted, tool.v), hardest * params.period)
+    sideways = across(change, u)
+    hardest = lever(params, norm(shaft)) * params.wrist_acceleration
+    excess = sub(sideways, limited(sideways, hardest * params.period))
+    v = plus(tool.v, sub(change, excess))
     du = over(across(v, u), norm(shaft))
     return ToolMotion(p, u, v, du, time), StopCode(code)
 
@@ -289,6 +356,10 @@ class ToolNavigation(StepBlock):
 
     Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
     The share itself is kept before the evasion of tools, by the clearance constraint.
+
+    Port ``clearance`` accepts the constraint's `ClearanceStatus`; calm without a wire.
+    While it escapes from a tool it is faster and may leave the view, and a target that
+    is lost or out of reach, a probe of the wall or an arm that lags do not stop it.
 
     Port ``tool`` emits the commanded `ToolMotion`.
 
@@ -326,11 +397,12 @@ class ToolNavigation(StepBlock):
                 "target": Estimate,
                 "view_cone": ViewCone,
                 "permission": Permission,
+                "clearance": ClearanceStatus,
             },
             {
                 "tool": ToolMotion(tip, u, still, still, 0.0),
                 "stop": StopCode(float(Stop.MOVING)),
             },
             params.period,
-            defaults={"permission": FREE},
+            defaults={"permission": FREE, "clearance": CALM},
         )

@@ -18,6 +18,8 @@ from systems.switching.signals import STANDING
 
 HIT, MISS = 0.9, -1.2
 """What a scan adds to the logarithm of the odds."""
+THROUGH = 0.025
+"""A ray passes through what is this near to it [m]; along a wall it goes beside it."""
 LEAST, MOST = -4.0, 27.0
 OCCUPIED = 1.7
 """Two hits more than passes: something stands there."""
@@ -103,7 +105,7 @@ def absorb(
                 continue
             if new[j, 0] > 0.0:  # only if it passes through what stood there
                 qx, qy = new[j, 1] - place.x, new[j, 2] - place.y
-                if abs(ex * qy - ey * qx) > 0.05 or ex * qx + ey * qy > far:
+                if abs(ex * qy - ey * qx) > THROUGH or ex * qx + ey * qy > far:
                     continue
             passed[j] = True
             new[j, 0] = max(new[j, 0] + MISS, LEAST)

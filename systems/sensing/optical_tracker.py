@@ -14,7 +14,7 @@ from pydrake.common import RandomDistribution
 
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import along, cross, sub, unit
+from systems.common.geometry import along, cross, plus, sub, unit, xyz
 from systems.common.parameter import ParameterError, Rules, check, parameter, part
 from systems.common.signal import (
     Field,
@@ -108,14 +108,38 @@ class OpticalTrackerParams:
     # 14.2 ms were measured on a Polaris Vega.
     latency: float = parameter(0.0142, "until it is delivered", "s", least=0, most=1)
     body: MarkerBody = part(MarkerBody)
+    # Where it takes the origin of W to be, and how it takes W to be turned.
+    shift: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "error of the registration",
+        "m",
+        least=-0.02,
+        most=0.02,
+        shape=(3,),
+    )
+    turn: list[float] = parameter(
+        [0.0, 0.0, 0.0],
+        "likewise, a rotation vector",
+        "rad",
+        least=-0.1,
+        most=0.1,
+        shape=(3,),
+    )
     losses: list[SightLoss] = parameter(
         [], "when the line of sight is blocked", shape=(-1,)
     )
 
 
-def constants(body: MarkerBody) -> np.ndarray:
-    """The markers as `disturb` takes them."""
+def constants(
+    body: MarkerBody,
+    shift: Sequence[float] = (0.0, 0.0, 0.0),
+    turn: Sequence[float] = (0.0, 0.0, 0.0),
+) -> np.ndarray:
+    """The markers as `disturb` takes them, and the registration's error."""
     return packed(
+        misplaced=any((*shift, *turn)),
+        shift=np.array(shift, float),
+        turn=np.array(turn, float),
         lever=body.lever,
         sigma_position=body.sigma_position(),
         sigma_direction=body.sigma_direction(),
@@ -136,6 +160,15 @@ def disturb(params: Any, shaft: Shaft, noise: MarkerNoise) -> Shaft:
     u = unit(along(shaft.u, params.sigma_direction, turn))
     p = along(shaft.tip, params.sigma_position, noise.place)
     return Shaft(along(p, params.lever, sub(u, shaft.u)), u)
+
+
+@compiled
+def misplaced(params: Any, shaft: Shaft) -> Shaft:
+    """A shaft as a tracker that is registered wrongly has it."""
+    turn = xyz(params.turn, 0)
+    u = unit(along(shaft.u, 1.0, cross(turn, shaft.u)))
+    tip = plus(shaft.tip, cross(turn, shaft.tip))
+    return Shaft(plus(tip, xyz(params.shift, 0)), u)
 
 
 @compiled
@@ -172,6 +205,8 @@ def _expose(
         shown = Shaft(last.tip, last.u)
         if seen:
             shown = disturb(record[0], shaft, read_noise(errors[tool]))
+            if record[0].misplaced:
+                shown = misplaced(record[0], shown)
         frame = TrackedShaft(shown.tip, shown.u, time, 1.0 if seen else 0.0)
         after[-1, tool] = write_frame(frame)
     return after.reshape(-1)
@@ -214,7 +249,7 @@ class OpticalTracker(Block):
         super().__init__()
         params = params or OpticalTrackerParams()
         check(params)
-        self._constants = constants(params.body)
+        self._constants = constants(params.body, params.shift, params.turn)
         self._losses = _packed_losses(params.losses, tools)
         self._shafts = [self.signal_in(tool, Shaft) for tool in tools]
         self._noise = self.signal_in(

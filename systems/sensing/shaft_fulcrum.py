@@ -202,6 +202,9 @@ def absorb_line(
         q = params.fulcrum_drift * params.fulcrum_drift * dt
         xx, xy, xz, yy, yz, zz = P
         P = (xx + q, xy, xz, yy + q, yz, zz + q)
+        if params.wall_pull > 0.0:
+            variance = params.sigma_wall**2 * params.wall_pull / max(dt, 1e-3)
+            g, P = measure(g, P, (0.0, 0.0, 1.0), params.wall_height, variance)
     d = sub(g, c)
     d2 = dot(d, d)
     ahead = dot(d, u)

@@ -85,6 +85,14 @@ class TrajectoryEstimatorParams:
         least=0,
         most=0.1,
     )
+    # Lines that hardly turn do not say where along them a fulcrum that walks is.
+    wall_pull: float = parameter(
+        0.0,
+        "in which its height is drawn to the wall's; 0: it is not",
+        "s",
+        least=0,
+        most=1e3,
+    )
 
     def rules(self) -> Rules:
         """What must hold across fields."""

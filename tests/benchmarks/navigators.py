@@ -5,9 +5,13 @@ obstacle that comes within two seconds.
 """
 
 from importlib.util import find_spec
+from math import hypot
 
 import numpy as np
 
+from plants.crowd.orca import orca_velocity
+from plants.crowd.signals import Obstacle
+from plants.crowd.social_force import social_force_towards
 from systems.switching.arcs import Disc, time_to_enter
 from systems.switching.classical_planner import ClassicalParams, summed_fields
 from systems.switching.signals import Corner, Seen
@@ -207,6 +211,41 @@ def hrvo(scene: Scene) -> Step:
         return float(ux), float(uy), _retreats(scene, x, y, seen)
 
     return step
+
+
+def crowds(model: str) -> Planner:
+    """The robot as one of the crowds' people, by ORCA or the social force, our own."""
+
+    def make(scene: Scene) -> Step:
+        robot = scene.robot
+
+        def step(
+            x: float,
+            y: float,
+            theta: float,
+            vx: float,
+            vy: float,
+            seen: list[Seen],
+            corners: list[Corner],
+        ) -> Command:
+            me = Obstacle(x, y, robot.radius + MARGIN, vx, vy)
+            others = [Obstacle(*o[1:]) for o in seen]
+            if model == "social_force":
+                (v,) = social_force_towards(
+                    [me, *others], [scene.goal], robot.speed, scene.dt
+                )
+                return *v, _retreats(scene, x, y, seen)
+            others.sort(key=lambda o: hypot(o.x - x, o.y - y))
+            gx, gy = scene.goal[0] - x, scene.goal[1] - y
+            size = max(hypot(gx, gy), 1e-9)
+            pace = min(robot.speed, 2.0 * size) / size
+            wanted = (pace * gx, pace * gy)
+            v = orca_velocity(me, others[:20], wanted, robot.speed, 5.0, scene.dt)
+            return *v, _retreats(scene, x, y, seen)
+
+        return step
+
+    return make
 
 
 def planners() -> dict[str, Planner]:

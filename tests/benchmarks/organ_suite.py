@@ -227,8 +227,9 @@ def run(one: Scene, bypass: bool) -> Outcome:
             d = sub(one.goal, p)
             way = tool_bypass.Choice(unit(d), norm(d), 0, 0, one.goal)
         v_tip = tool_bypass.follow(BYPASS, v_tip, PLANNER_PERIOD, G, way)
+        still = np.zeros((1 + len(tools), 3))
         v, dodging, _ = clearance_constraint.constrain(
-            CONSTRAINT, ROOM, NO_CONE, G, p, v_tip, tools, dodging, organs
+            CONSTRAINT, ROOM, NO_CONE, G, p, v_tip, tools, dodging, still, organs
         )
         p = ROBOT.moved(G, p, v, PLANNER_PERIOD)
         time += PLANNER_PERIOD

@@ -48,6 +48,14 @@ class Senses:
     tracking: TrackingParams = field(default_factory=TrackingParams)
 
 
+LEGS = (
+    LidarParams(legs=True),
+    OdometryParams(),
+    TrackingParams(person=0.3),
+)
+"""The same where obstacles are people."""
+
+
 class Sensed:
     """A robot's perception in one scene; it never sees its true pose."""
 

@@ -41,6 +41,7 @@ BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],
     "gauze_hunted": [],
+    "gauze_dynamic_real": [],
     "gauze_press": [],
     "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
@@ -210,7 +211,7 @@ OBSERVE = {
     *("GridMapping", "Perception", "RobotLocation", "SnakeLoad", "SnakeLocation"),
     *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
-    *("BallLocation", "ToolLoad", "WrenchWatch"),
+    *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}

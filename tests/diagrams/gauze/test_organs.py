@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.common.scenario import ScenarioError
+from diagrams.gauze.plots import plots
 from diagrams.studies import load_scenario
 from systems.motion.tissue_press import Phase
 from tests.runs import run
@@ -55,6 +56,15 @@ def test_gauze_is_pressed_on_the_liver_by_force():
     error = pressed.press.touch.force[holding] - force[holding]
     assert np.sqrt(np.mean(error**2)) < 0.1
     assert force[status.phase < Phase.PRESSING].max() == 0.0
+
+
+def test_clearance_and_force_are_drawn():
+    upper, lower = plots(run("gauze_press"))["organs"].axes
+    assert len(upper.lines) == 1 + 4
+    assert [line.get_label() for line in lower.lines][:2] == [
+        "tissue, true",
+        "as R has it",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -18,12 +18,14 @@ from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
 from systems.common.reach_limits import ReachLimits
 from systems.common.signal import example, flat
-from systems.common.signals import FREE, Estimate, Guide, RobotTool
+from systems.common.signals import FREE, Estimate, Guide, RobotTool, ViewCone
 
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
+INSIDE = clearance_constraint.constants(ClearanceConstraintParams(outside=0.0))[0]
 ROOM = workspace.constants(ReachLimits(max_tilt=3.1), WorkspaceParams(floor=-0.5))[0]
 NOT_DODGING = np.zeros(3)
+STILL = np.zeros((4, 3))
 
 
 def tool(a, tip, v=(0.0, 0.0, 0.0)) -> ObstacleTool:
@@ -64,11 +66,70 @@ def test_the_rate_agrees_with_finite_differences():
     assert compared > 800
 
 
+def test_the_shafts_outside_the_body_are_kept_apart_as_well():
+    """Inside they are far from each other, above the wall O's comes for R's."""
+    a, v_o, dt = (-0.06, 0.03, 0.0), (0.0, 0.02, 0.0), 1.0 / 240.0
+    lows = []
+    for record in (RECORD, INSIDE):
+        p, tip, low = (0.05, 0.0, -0.1), (-0.09, 0.03, -0.1), 1.0
+        for _ in range(480):
+            o = tool(a, tip, v_o)
+            v, _, _ = constrain(
+                record, ROOM, NO_CONE, G, p, G, rows(o), NOT_DODGING, STILL
+            )
+            p, tip = moved(p, v, dt), moved(tip, v_o, dt)
+            ends = [
+                geometry.along(g, -0.3, geometry.unit(geometry.sub(x, g)))
+                for g, x in ((G, p), (a, tip))
+            ]
+            low = min(low, geometry.closest_points(G, ends[0], a, ends[1]).distance)
+        lows.append(low)
+    assert lows[0] > 0.0069
+    assert lows[1] < 0.005
+
+
+def test_the_view_gives_way_to_a_tool_and_nothing_else():
+    p, a, tip = (0.0, 0.0, -0.12), (0.02, 0.09, 0.0), (0.013, -0.05, -0.08)
+    low = ViewCone((0.002, 0.0, -0.112), (0.0, 0.0, -1.0), 0.5)
+    sweep = rows(tool(a, tip, (-0.2, 0.0, 0.0)))
+    v, _, status = constrain(
+        RECORD, ROOM, low, G, p, (0.0, 0.0, 0.0), sweep, NOT_DODGING, STILL
+    )
+    assert v[2] > 0.1 and status.blind == 1.0 == status.escape
+    away = rows(tool((0.3, 0.3, 0.0), (0.3, 0.3, -0.05)))
+    v, _, status = constrain(
+        RECORD, ROOM, low, G, p, (0.0, 0.0, 0.1), away, NOT_DODGING, STILL
+    )
+    assert status.blind == 0.0 == status.escape
+    assert v[2] < 0.09 and status.change > 0.01
+
+
+def test_a_tool_that_drives_the_tip_into_a_border_is_dodged_in_time():
+    """Slow enough to be carried along, but not for ever: the tilt ends it."""
+    p, a, tip = (0.078, 0.0, -0.1), (0.0, 0.11, 0.0), (0.022, -0.05, -0.05)
+    room = workspace.constants(ReachLimits(max_tilt=0.7), WorkspaceParams())[0]
+    row = rows(tool(a, tip, (0.02, 0.0, 0.01)))
+    rate = distance_rate(G, p, read_tool(row[0]))
+    assert 0.0 < rate.c < 0.02 and 0.2 < rate.s < 0.9
+    _, _, status = constrain(RECORD, room, NO_CONE, G, p, G, row, NOT_DODGING, STILL)
+    assert status.dodge == 1.0
+    _, _, status = constrain(RECORD, ROOM, NO_CONE, G, p, G, row, NOT_DODGING, STILL)
+    assert status.dodge == 0.0
+
+
 def test_what_is_safe_passes_unchanged():
     far = tool((0.1, 0.1, 0.0), (0.08, 0.1, -0.1))
     wanted = (0.03, 0.01, -0.02)
     v, _, status = constrain(
-        RECORD, ROOM, NO_CONE, G, (0.0, 0.0, -0.1), wanted, rows(far), NOT_DODGING
+        RECORD,
+        ROOM,
+        NO_CONE,
+        G,
+        (0.0, 0.0, -0.1),
+        wanted,
+        rows(far),
+        NOT_DODGING,
+        STILL,
     )
     assert v == pytest.approx(wanted, abs=1e-12)
     assert status.near == 0.0 and status.condition == 1.0 and status.change < 1e-9
@@ -82,7 +143,7 @@ def test_the_distance_is_held_against_a_tool_that_evasion_can_match():
     for _ in range(600):
         row = rows(tool(a, tip, v_o))
         v, dodging, status = constrain(
-            RECORD, ROOM, NO_CONE, G, p, (0.02, 0.0, 0.0), row, dodging
+            RECORD, ROOM, NO_CONE, G, p, (0.02, 0.0, 0.0), row, dodging, STILL
         )
         held = held and status.condition > 0.5
         p, tip = moved(p, v, dt), moved(tip, v_o, dt)
@@ -96,7 +157,7 @@ def test_a_sweep_that_is_too_fast_is_told_and_dodged():
     p, a, tip = (0.0, 0.0, -0.12), (0.02, 0.09, 0.0), (0.013, -0.05, -0.08)
     row = rows(tool(a, tip, (-0.2, 0.0, 0.0)))
     v, dodging, status = constrain(
-        RECORD, ROOM, NO_CONE, G, p, (0.0, 0.0, 0.0), row, NOT_DODGING
+        RECORD, ROOM, NO_CONE, G, p, (0.0, 0.0, 0.0), row, NOT_DODGING, STILL
     )
     assert status.near == 1.0 and status.condition == 0.0
     assert dodging[0] == 1.0 == status.dodge
@@ -111,11 +172,13 @@ def test_the_borders_of_the_workspace_hold():
         ((0.0, 0.0, -0.0999), (0.0, 0.0, -0.1), (0.0, 0.0, -1.0)),
         ((0.0, 0.0, -0.0301), (0.0, 0.0, 0.1), (0.0, 0.0, 1.0)),
     ):
-        v, _, _ = constrain(RECORD, room, NO_CONE, G, p, wanted, away, NOT_DODGING)
+        v, _, _ = constrain(
+            RECORD, room, NO_CONE, G, p, wanted, away, NOT_DODGING, STILL
+        )
         assert geometry.dot(v, axis) < 1e-3
     tilted = (0.1 * np.sin(0.4999), 0.0, -0.1 * np.cos(0.4999))
     v, _, _ = constrain(
-        RECORD, room, NO_CONE, G, tilted, (0.1, 0.0, 0.0), away, NOT_DODGING
+        RECORD, room, NO_CONE, G, tilted, (0.1, 0.0, 0.0), away, NOT_DODGING, STILL
     )
     assert v[0] < 0.07
     angle = np.arctan2(tilted[0] + 0.01 * v[0], -(tilted[2] + 0.01 * v[2]))

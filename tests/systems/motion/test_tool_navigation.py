@@ -11,6 +11,7 @@ from systems.bypass.workspace import constants as workspace_constants
 from systems.common.reach_limits import ReachLimits
 from systems.common.signal import example, flat, view
 from systems.common.signals import (
+    ClearanceStatus,
     Estimate,
     Guide,
     Permission,
@@ -143,6 +144,41 @@ def test_why_the_robot_stands(changes, stop):
     speed = lengths(tool.v[-1])
     assert all(np.isfinite(part).all() for part in tool)
     assert (speed > 0.01) if stop == Stop.MOVING else speed == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "goes"),
+    [
+        ({}, True),
+        ({"target": TARGET._replace(known=0.0)}, True),
+        ({"permission": Permission(0.0, float(Stop.PROBING))}, True),
+        ({"permission": Permission(0.0, float(Stop.WALL_LOADED))}, False),
+        ({"obstacles": [TARGET._replace(known=0.0)]}, False),
+    ],
+)
+def test_out_of_a_tools_way_it_is_faster_and_leaves_the_view(changes, goes):
+    calm = ClearanceStatus(0, 1, 1, 0, 0, 0, 0, 0)
+    hurry = calm._replace(escape=1)
+    up = run([0.0, 0.0, 0.2], 0.25, 1.0, clearance=hurry, **changes)[0]
+    assert (lengths(up.v).max() > 0.19) == goes
+    up = run([0.0, 0.0, 0.2], 0.25, 1.0, clearance=calm, **changes)[0]
+    assert lengths(up.v).max() <= 0.1
+    cone = ViewCone(P_WG, (0.0, 0.0, -1.0), 0.2)
+    inside = {"target": TARGET._replace(p=(0.0, 0.0, -0.1))} | changes
+    for status, leaves in ((hurry, goes), (calm, False)):
+        aside = run([0.05, 0, 0], 0.7, 1.0, view_cone=cone, clearance=status, **inside)[
+            0
+        ]
+        assert (aside.tip[-1][0] > 0.025) == leaves
+
+
+def test_the_wrist_moves_no_faster_than_it_can():
+    """With little of the shaft inside, the other end of it goes a long way."""
+    tool, _ = run([0.1, 0.0, 0.0], 0.4, 1.0)
+    outside = 0.4 - lengths(tool.tip)
+    assert (lengths(tool.du) * outside).max() <= 0.25 + 1e-3
+    change = np.diff(lengths(tool.du)) * 60
+    assert (np.abs(change) * outside[1:]).max() <= 5.0 + 0.1
 
 
 @pytest.mark.parametrize("place", range(3))
