@@ -85,7 +85,7 @@ class ResectionScenario(Scenario):
     snake: SnakeParams = part(SnakeParams)
     drive: SnakeDriveParams = part(SnakeDriveParams)
     player: ProcedurePlayerParams = part(ProcedurePlayerParams)
-    resection_ik: ResectionIkParams = part(ResectionIkParams)
+    resection_ik: ResectionIkParams = part(lambda: ResectionIkParams(bend_rate=2.0))
     inverse_actuation: WireInverseActuationParams = part(WireInverseActuationParams)
     drums: WireDrumsParams = part(WireDrumsParams)
     tension: WireTensionParams = part(WireTensionParams)

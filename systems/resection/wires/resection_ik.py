@@ -34,7 +34,7 @@ class ResectionIkParams:
 
     period: float = parameter(0.02, "of the postures", "s", least=1e-3, most=0.1)
     bend_rate: float = parameter(
-        2.0, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
+        1.5, "largest rate of a or b of a ball", "rad/s", least=0.01, most=10.0
     )
     travel_rate: float = parameter(
         0.03, "largest speed of the translation", "m/s", least=1e-4, most=0.5
