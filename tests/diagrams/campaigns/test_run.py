@@ -18,7 +18,7 @@ from diagrams.campaigns.engine import cluster
 from diagrams.campaigns.report import write_report
 from diagrams.campaigns.run import Interrupted, run_campaign
 from diagrams.campaigns.splitting import SplittingParams
-from diagrams.campaigns.store import Store
+from diagrams.campaigns.store import Store, schema
 from diagrams.common.cli import main
 from diagrams.common.scenario import ScenarioError
 
@@ -54,6 +54,12 @@ def test_rows_are_what_was_drawn(undisturbed):
     assert (one.x.to_numpy() == two.x.to_numpy()).all()  # the same draws
     assert (one.share.to_numpy() != two.share.to_numpy()).any()
     assert 0.1 < (one.x > 1).mean() < 0.25
+
+
+def test_a_figure_called_as_a_column_leaves_that_as_it_is():
+    columns = schema({"seed": 1, "run": 0.5, "x": 2})
+    assert str(columns.field("seed").type) == "int64"
+    assert columns.names.count("seed") == columns.names.count("run") == 1
 
 
 def test_number_of_workers_makes_no_difference(undisturbed, tmp_path):
