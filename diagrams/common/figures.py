@@ -28,7 +28,7 @@ FIGURES = {
     "recording_played": Figure("%", "of the tools' recordings, of the shortest share"),
     "min_tool_clearance": Figure("m", "least true gap to the obstacle tools"),
     "min_gauze_clearance": Figure(
-        "m", "least true gap of the gauze to the obstacle tools"
+        "m", "least true gap of gauze to the obstacle tools"
     ),
     "unavoidable": Figure("", "whether no dodge by who is told the future kept clear"),
     "registration_error": Figure("m", "of the tool as the tracker has it, at the end"),
