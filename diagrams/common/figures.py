@@ -27,9 +27,7 @@ FIGURES = {
     "final_tip_error": Figure("m", "of the tip from its target at the end"),
     "recording_played": Figure("%", "of the tools' recordings, of the shortest share"),
     "min_tool_clearance": Figure("m", "least true gap to the obstacle tools"),
-    "min_gauze_clearance": Figure(
-        "m", "least true gap of gauze to the obstacle tools"
-    ),
+    "min_gauze_clearance": Figure("m", "least true gap of gauze to the obstacle tools"),
     "unavoidable": Figure("", "whether no dodge by who is told the future kept clear"),
     "registration_error": Figure("m", "of the tool as the tracker has it, at the end"),
     "rms_tip_force_error": Figure("N", "of the force told at the tip, rms"),
