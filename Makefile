@@ -38,7 +38,7 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy & types=$$!; \
-	$(BIN)/python -m pytest -m "not study" -n $(JOBS) --dist loadgroup \
+	$(BIN)/python -m pytest -m "not study" -n $(JOBS) --dist loadfile \
 		--no-loadscope-reorder && wait $$types
 
 golden: setup
