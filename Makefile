@@ -38,8 +38,8 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy & types=$$!; \
-	$(BIN)/python -m pytest -m "not study" -n $(JOBS) --dist loadfile \
-		--no-loadscope-reorder && wait $$types
+	$(BIN)/python -m pytest -m "not study" -n $(JOBS) --no-loadscope-reorder \
+		&& wait $$types
 
 golden: setup
 	$(BIN)/python -m tests.golden $(ONLY)

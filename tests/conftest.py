@@ -1,17 +1,21 @@
 """Fixtures that all tests share, and their order."""
 
+from functools import cache
+import json
 import os
 from pathlib import Path
 import shutil
 import subprocess
+from typing import Any
 
 from hypothesis import settings
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
-DIAGRAMS = Path(__file__).parent / "diagrams"
+GOLDEN = Path(__file__).parent / "golden.json"
 
 FIRST = ("resection", "gauze", "wrist", "snake")
 """Systems whose tests take longest and compile most kernels: they are begun with."""
@@ -30,26 +34,41 @@ CHROMIUM_FLAGS = [
 ]
 
 
-def group(item: pytest.Item) -> str:
+@cache
+def systems() -> dict[str, str]:
+    """The system of every row of golden figures."""
+    return {row: told["system"] for row, told in json.loads(GOLDEN.read_text()).items()}
+
+
+def group(nodeid: str) -> str:
     """What runs on one worker: all tests of a system's diagram, else those of a file.
 
     They share runs of scenarios, and no two workers compile the same kernels.
     """
-    marker = item.get_closest_marker("xdist_group")
-    if marker is not None:
-        return str(marker.args[0])
-    folder = item.path.parent
-    return folder.name if folder.parent == DIAGRAMS else str(item.path)
+    path, _, name = nodeid.partition("::")
+    row = name.partition("[")[2].removesuffix("]")
+    if "test_golden" in path and row in systems():
+        return systems()[row]
+    folder = Path(path).parent
+    return folder.name if folder.parent.name == "diagrams" else path
 
 
-@pytest.hookimpl(tryfirst=True)  # before the workers read the groups
+class BySystem(LoadScopeScheduling):
+    """Gives each worker whole groups of tests."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return group(nodeid)
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> BySystem:
+    """Takes the place of `--dist`."""
+    return BySystem(config, log)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Groups the tests, and puts the long groups first."""
-    groups = {item: group(item) for item in items}
-    for item, name in groups.items():
-        item.add_marker(pytest.mark.xdist_group(name))
+    """Puts the long groups first."""
     place = {name: number for number, name in enumerate(FIRST)}
-    items.sort(key=lambda item: place.get(groups[item], len(FIRST)))
+    items.sort(key=lambda item: place.get(group(item.nodeid), len(FIRST)))
 
 
 @pytest.fixture(scope="session")

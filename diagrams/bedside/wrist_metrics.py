@@ -6,6 +6,8 @@ import numpy as np
 
 CONVERGED = 1e-3
 """The fulcrum is found when the estimate is this close to stay [m]."""
+AFTER = 3.0
+"""Figures of force and fulcrum that end in `_3s` begin here [s]."""
 CHI2_95 = 7.815
 """95 % point of the normalised squared error of a 3-D estimate."""
 

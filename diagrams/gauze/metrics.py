@@ -4,23 +4,21 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.bedside.wrist_metrics import most, rms, wrist_figures
+from diagrams.bedside.wrist_metrics import AFTER, most, rms, wrist_figures
 from diagrams.gauze.bypass_metrics import bypass_figures
 from diagrams.gauze.foresight import Reach, unavoidable
 from diagrams.gauze.organs import organ_figures
 from diagrams.gauze.scenes import CONTACT
 from diagrams.gauze.sight import sight_figures
 from diagrams.gauze.tools import TARGET, gap, logged
+from plants.instruments.instrument import GAUZE_RADIUS
 from plants.surgeon.recording import load_recording
+from systems.common.geometry import closest_on_segment
 from systems.common.signal import vector
 from systems.common.stops import Stop
 
 REACHED_DISTANCE = 0.002
 """The gauze is delivered while the tip is this close to S's true tip [m] ..."""
-SETTLED = 3.0
-"""Figures of the force that leave out how the fulcrum is found start here [s]."""
-GAUZE = 0.004
-"""Radius of the gauze at the tip [m]."""
 REACHED_TIME = 0.5
 """... for this long [s]."""
 
@@ -83,12 +81,14 @@ def tool_lines(run: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def gauze_clearance(run: Any) -> float:
     """Least distance of the gauze's surface at R's tip from an obstacle's [m]."""
-    tips, fulcrums = tool_lines(run)
-    shaft = fulcrums - tips
-    way = run.robot.tool.tip[:, None] - tips
-    share = np.einsum("nik,nik->ni", way, shaft) / np.sum(shaft**2, axis=-1)
-    near = way - np.clip(share, 0.0, 1.0)[..., None] * shaft
-    return float(np.linalg.norm(near, axis=-1).min() - GAUZE - CONTACT / 2.0)
+    tips, ends = tool_lines(run)
+    ways = zip(run.robot.tool.tip, tips, ends, strict=True)
+    least = min(
+        closest_on_segment(vector(p), vector(a), vector(b))[1]
+        for p, each, inner in ways
+        for a, b in zip(each, inner, strict=True)
+    )
+    return least - GAUZE_RADIUS - CONTACT / 2.0
 
 
 def could_not_be_avoided(run: Any) -> bool:
@@ -139,8 +139,8 @@ def measure(run: Any) -> dict[str, Any]:
         "max_lateral_force": float(force.max()),
         "rms_lateral_force": float(np.sqrt(np.mean(force**2))),
         "max_fulcrum_error": float(run.wall.fulcrum_error.distance.max()),
-        "max_lateral_force_3s": most(force[time >= SETTLED]),
-        "rms_lateral_force_3s": rms(force[time >= SETTLED]),
+        "max_lateral_force_3s": most(force[time >= AFTER]),
+        "rms_lateral_force_3s": rms(force[time >= AFTER]),
         "min_gauze_clearance": gauze_clearance(run),
         "unavoidable": could_not_be_avoided(run),
         "time_in_view": float(

@@ -18,6 +18,10 @@ AMONG = (
     *("tissue_force", "tissue_press", "endoscope"),
 )
 """Blocks that take how organs move, where they have a port for it."""
+WIRES = [
+    *(("organs.y0", f"{block}.organs") for block in AMONG),
+    ("organ_touch.applied", "plant.applied_spatial_force"),
+]
 EXPORTS = {
     "organs.touch": "organ_touch.touch",
     "organs.gaps": "organ_touch.gaps",
@@ -93,19 +97,11 @@ def add_press(builder: Any, scenario: Any, organs: OrganSet) -> dict[str, Any]:
 
 def wired(scenario: Any, wires: list[tuple[str, str]]) -> list[tuple[str, str]]:
     """A diagram's wires with those of the organs, which take the place of some."""
-    if not scenario.organs:
-        return wires
     wires = wires + WIRES
     if scenario.press.active:
         taken = {sink for _, sink in PRESS_WIRES}
         wires = [wire for wire in wires if wire[1] not in taken] + PRESS_WIRES
     return wires
-
-
-WIRES = [
-    *(("organs.y0", f"{block}.organs") for block in AMONG),
-    ("organ_touch.applied", "plant.applied_spatial_force"),
-]
 
 
 def organ_signals(scenario: Any) -> dict[str, Any]:

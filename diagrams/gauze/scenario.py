@@ -194,6 +194,11 @@ def check_organs(scenario: GauzeScenario) -> None:
             f"wrist={scenario.wrist!r}: expected 'pwe' with press.active, whose force "
             "loop needs the wrist's sensor"
         )
+    if scenario.tip_load.active:
+        raise ScenarioError(
+            "tip_load.active=True: expected False with press.active, which tells what "
+            "touches the tip itself"
+        )
 
 
 def check_tools(scenario: GauzeScenario) -> None:

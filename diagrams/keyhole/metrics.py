@@ -4,15 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.bedside.wrist_metrics import most, rms
+from diagrams.bedside.wrist_metrics import AFTER, most, rms
 from diagrams.gauze.tools import OBSTACLE, in_the_way
 from diagrams.resection.metrics import outside_depth
 from plants.tissue.labels import CRITICAL
 from systems.keyhole.phases import Phases, Reason
 
 REASON = {reason.value: reason.text for reason in Reason}
-AFTER = 3.0
-"""Figures of force and fulcrum that end in `_3s` begin here, in s."""
 
 
 def tool_errors(run: Any) -> np.ndarray:

@@ -135,10 +135,10 @@ def _next_place(
 
 def _within(hand: SyntheticHand, fulcrum: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """The place nearest on the goal's line that the tool can have its tip at."""
-    shaft = goal - fulcrum
+    way = goal - fulcrum
     # No flatter under the wall than 20 degrees.
-    across = float(np.hypot(shaft[0], shaft[1]))
-    shaft[2] = min(shaft[2], -0.36 * across, -1e-3)
-    depth = float(np.linalg.norm(shaft))
+    across = float(np.hypot(way[0], way[1]))
+    way[2] = min(way[2], -0.36 * across, -1e-3)
+    depth = float(np.linalg.norm(way))
     wanted = min(max(depth, hand.least_depth), hand.most_depth)
-    return fulcrum + wanted / depth * shaft
+    return fulcrum + wanted / depth * way

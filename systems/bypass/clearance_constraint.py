@@ -36,8 +36,7 @@ asked for is at most gamma times the closing speed: gamma <= a_max / (v_max + V_
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -45,33 +44,34 @@ from plants.organs.distance import Organs
 from plants.organs.organs import OrganSet, arrays, port
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
+from systems.bypass.distance_rate import (
+    are_parallel,
+    distance_rate,
+    drifting,
+    least_rate,
+    outer_rate,
+    tip_rates,
+)
+from systems.bypass.dodge import driven_time, must_dodge
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
 from systems.bypass.organ_rows import organ_rows
-from systems.bypass.shadow_body import ObstacleTool, read_tool
+from systems.bypass.shadow_body import read_tool
+from systems.bypass.trocar_drift import trocar_drift
 from systems.bypass.workspace import VIEW, WorkspaceParams, borders
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     all_finite,
-    along,
-    any_perpendicular,
-    closest_on_segment,
-    closest_points,
-    cross,
     dot,
-    limited,
     norm,
-    over,
     row_of,
     scaled,
     set_row,
-    shaft_point_velocity,
     sub,
     unit,
-    xyz,
 )
 from systems.common.parameter import Rules, check, parameter
 from systems.common.projection import greatest_rate, most_missed, nearest_velocity
-from systems.common.reach_limits import ReachLimits, lever
+from systems.common.reach_limits import ReachLimits, fastest_sideways
 from systems.common.signal import Many, Vector
 from systems.common.signals import (
     CALM,
@@ -91,18 +91,8 @@ from systems.common.signals import (
 )
 from systems.common.step_block import StepBlock
 
-_PARALLEL = 0.2
-"""Sine of the angle below which a tip's own distance is constrained as well."""
-_OUTWARDS = 0.05
-"""Share of insertion in A above which retracting would bring R nearer to the tool."""
 _TROCAR = 6
 """Numbers that are kept of a trocar."""
-_JUMP = 0.005
-"""No trocar moves so far in a step, m."""
-_FASTEST_TROCAR = 0.03
-"""Nor so fast, m/s."""
-_CLOSING = 0.004
-"""A tool that closes more slowly is not dodged, m/s: it may be the tracker's noise."""
 _MISSED = 1e-3
 """A row is missed by more than the solver's own error, m/s."""
 
@@ -168,166 +158,6 @@ def constants(params: ClearanceConstraintParams) -> np.ndarray:
     return packed(params)
 
 
-class DistanceRate(NamedTuple):
-    """How a distance of the axes changes: d rho/dt = A . v - c.
-
-    Attributes:
-        rho: The distance, m.
-        s: Proportion of R's inserted length at which it is.
-        A: What the velocity of R's tip does.
-        c: What the tool itself does, m/s.
-        n: Unit vector from the tool to R.
-        l_over_L: Proportion of the tool's inserted length at which it is.
-    """
-
-    rho: float
-    s: float
-    A: Vector
-    c: float
-    n: Vector
-    l_over_L: float
-
-
-@compiled
-def drifting(rate: DistanceRate, v_G: Vector, v_GO: Vector) -> DistanceRate:
-    """The same for trocars that move: R's at v_G, the tool's at v_GO, m/s."""
-    own = (1.0 - rate.s) * dot(rate.n, v_G)
-    closing = rate.c + (1.0 - rate.l_over_L) * dot(rate.n, v_GO) - own
-    return DistanceRate(rate.rho, rate.s, rate.A, closing, rate.n, rate.l_over_L)
-
-
-@compiled
-def leverage(s: float, n: Vector, u: Vector) -> Vector:
-    """A for the proportion s of R along u; a fulcrum is no material point."""
-    if s == 0.0:
-        return 0.0, 0.0, 0.0
-    return along(scaled(s, n), (1.0 - s) * dot(n, u), u)
-
-
-@compiled
-def distance_rate(g: Vector, p: Vector, tool: ObstacleTool) -> DistanceRate:
-    """How the distance to a tool changes for R from its fulcrum g to its tip p, m.
-
-    A closest point at a fulcrum is no material point: there its tool does not count.
-    """
-    near = closest_points(g, p, tool.fulcrum, tool.tip)
-    u, o = unit(sub(p, g)), unit(sub(tool.tip, tool.fulcrum))
-    n = unit(sub(near.p_A, near.p_B), unit(cross(u, o), any_perpendicular(u)))
-    closing = 0.0
-    if near.t > 0.0:
-        closing = dot(n, shaft_point_velocity(near.t, o, tool.v))
-    return DistanceRate(
-        near.distance, near.s, leverage(near.s, n, u), closing, n, near.t
-    )
-
-
-@compiled
-def outer_rate(
-    g: Vector, p: Vector, tool: ObstacleTool, outside: float
-) -> DistanceRate:
-    """The same above the wall, for `outside` m of both shafts: s is negative there."""
-    shaft, other = sub(p, g), sub(tool.tip, tool.fulcrum)
-    u, o = unit(shaft), unit(other)
-    ends = along(g, -outside, u), along(tool.fulcrum, -outside, o)
-    near = closest_points(g, ends[0], tool.fulcrum, ends[1])
-    n = unit(sub(near.p_A, near.p_B), unit(cross(u, o), any_perpendicular(u)))
-    s, l_over_L = -near.s * outside / norm(shaft), -near.t * outside / norm(other)
-    closing = 0.0
-    if near.t > 0.0:
-        closing = dot(n, shaft_point_velocity(l_over_L, o, tool.v))
-    return DistanceRate(near.distance, s, leverage(s, n, u), closing, n, l_over_L)
-
-
-@compiled
-def are_parallel(g: Vector, p: Vector, tool: ObstacleTool) -> bool:
-    """Whether R and a tool are nearly parallel: the closest points jump there."""
-    u, o = unit(sub(p, g)), unit(sub(tool.tip, tool.fulcrum))
-    return norm(cross(u, o)) < _PARALLEL
-
-
-@compiled
-def tip_rates(
-    g: Vector, p: Vector, tool: ObstacleTool
-) -> tuple[DistanceRate, DistanceRate]:
-    """The same for R's tip and the tool's shaft, and for its tip and R's shaft."""
-    a, p_o = tool.fulcrum, tool.tip
-    u, o = unit(sub(p, g)), unit(sub(p_o, a))
-    aside = any_perpendicular(u)
-    t, rho = closest_on_segment(p, a, p_o)
-    n = unit(sub(p, along(a, t, sub(p_o, a))), aside)
-    closing = dot(n, shaft_point_velocity(t, o, tool.v)) if t > 0.0 else 0.0
-    own = DistanceRate(rho, 1.0, n, closing, n, t)
-    s, rho = closest_on_segment(p_o, g, p)
-    n = unit(sub(along(g, s, sub(p, g)), p_o), aside)
-    return own, DistanceRate(rho, s, leverage(s, n, u), dot(n, tool.v), n, 1.0)
-
-
-@compiled
-def withdrawal_time(params: Any, way: float) -> float:
-    """Time in s to pull the tip back by `way`, m, from rest."""
-    ramp = 0.5 * params.max_speed**2 / params.acceleration
-    if way <= ramp:
-        return sqrt(2.0 * max(0.0, way) / params.acceleration)
-    return way / params.max_speed + 0.5 * params.max_speed / params.acceleration
-
-
-@compiled
-def driven_time(rate: DistanceRate, normals: np.ndarray, room: np.ndarray) -> float:
-    """Time in s until a tool that R gives way to has driven its tip into a border.
-
-    Args:
-        rate: Of the distance to the tool.
-        normals: Of the borders, inwards (n, 3).
-        room: Before each, m (n).
-    """
-    left, square = 1e9, dot(rate.A, rate.A)
-    if square < 1e-12:
-        return 0.0
-    for k in range(len(room)):
-        outwards = -rate.c * dot(row_of(normals, k), rate.A) / square
-        if outwards > 1e-6:
-            left = min(left, max(0.0, room[k]) / outwards)
-    return left
-
-
-@compiled
-def must_dodge(
-    params: Any,
-    is_dodging: bool,
-    q: float,
-    rate: DistanceRate,
-    safe: float,
-    outwards: float,
-    evasion: float,
-    driven: float,
-) -> bool:
-    """Whether R retracts from a tool that sweeps the inside of its shaft.
-
-    Args:
-        params: A record of `constants`.
-        is_dodging: Whether it does already.
-        q: Insertion, m.
-        rate: Of the distance to the tool.
-        safe: D_safe, m.
-        outwards: Share of insertion in A.
-        evasion: e, m/s.
-        driven: See `driven_time`.
-    """
-    if outwards > _OUTWARDS or rate.c <= (0.5 if is_dodging else 1.0) * _CLOSING:
-        return False
-    left = max(0.0, rate.rho - safe) / rate.c
-    if rate.c <= (0.4 if is_dodging else 0.6) * evasion:
-        left += driven
-    needed = withdrawal_time(params, q - (rate.s * q - safe))
-    return left < 1.5 * needed + 0.3
-
-
-@compiled
-def least_rate(params: Any, rate: DistanceRate, safe: float, evasion: float) -> float:
-    """The bound of A . v, m/s: no more than can be done, as fast away as possible."""
-    return min(rate.c - params.rate * (rate.rho - safe), 0.9999 * evasion)
-
-
 @compiled
 def constrain(
     params: Any,
@@ -360,7 +190,7 @@ def constrain(
     """
     shaft = sub(p, g)
     q, u = norm(shaft), unit(shaft)
-    turning = min(q * params.turning_speed, lever(workspace, q) * workspace.wrist_speed)
+    turning = fastest_sideways(workspace, q, params.turning_speed)
     dodges = np.zeros(len(dodging))
     least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
     escape, blind = 0.0, 0.0
@@ -370,7 +200,7 @@ def constrain(
     returning = np.minimum(-params.rate * room, 0.25 * params.max_speed)
     further, least_rates = inwards, returning
     if organs is not None:
-        organs_inwards, organs_returning = organ_rows(params, organs, g, p)
+        organs_inwards, organs_returning = organ_rows(params, organs, g, p, turning)
         further = np.concatenate((organs_inwards, inwards))
         least_rates = np.concatenate((organs_returning, returning))
     most = 4 * len(tools) + len(least_rates)
@@ -447,32 +277,6 @@ def constrain(
         least, is_near, holds, dodge, change, missed, escape, blind
     )
     return wanted, dodges, status
-
-
-@compiled
-def trocar_drift(
-    params: Any, places: np.ndarray, g: Vector, tools: np.ndarray
-) -> np.ndarray:
-    """Where the trocars are and how fast they move, smoothed: rows of six, m and m/s.
-
-    Args:
-        params: A record of `constants`.
-        places: The same of the last step, R's first; as many as tools and one, or more.
-        g: Fulcrum G_R, m.
-        tools: Rows of `ObstacleTool`.
-    """
-    share, after = 1.0 - exp(-params.period / params.drift_time), places.copy()
-    for i in range(1 + len(tools)):
-        place = g if i == 0 else read_tool(tools[i - 1]).fulcrum
-        before, v = xyz(places[i], 0), xyz(places[i], 3)
-        way = sub(place, before)
-        if norm(way) > _JUMP:  # another tool, or the first of it
-            v = (0.0, 0.0, 0.0)
-        else:
-            v = along(v, share, sub(over(way, params.period), v))
-        after[i, 0], after[i, 1], after[i, 2] = place
-        after[i, 3], after[i, 4], after[i, 5] = limited(v, _FASTEST_TROCAR)
-    return after
 
 
 @compiled

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from plants.organs.distance import SAFE, Organs, distance, normal, velocity
+from systems.bypass.distance_rate import DistanceRate, least_rate, leverage
 from systems.common.compiled import compiled
-from systems.common.geometry import along, dot, norm, set_row, shaft_point_velocity, sub
+from systems.common.geometry import along, dot, norm, over, set_row, sub
 from systems.common.projection import greatest_rate
 from systems.common.signal import Vector
 
@@ -40,15 +41,16 @@ def _row(
     room: float,
     v_organ: Vector,
 ) -> tuple[Vector, float]:
-    """A row and its bound, m/s: no more than can be done."""
-    A = shaft_point_velocity(s, u, n)
-    most = greatest_rate(A, u, params.max_speed, turning)
-    return A, min(dot(n, v_organ) - params.rate * room, 0.9999 * most)
+    """A row and its bound, m/s."""
+    A = leverage(s, n, u)
+    rate = DistanceRate(room, s, A, dot(n, v_organ), n, 1.0)
+    evasion = greatest_rate(A, u, params.max_speed, turning)
+    return A, least_rate(params, rate, 0.0, evasion)
 
 
 @compiled
 def organ_rows(
-    params: Any, organs: Organs, g: Vector, p: Vector
+    params: Any, organs: Organs, g: Vector, p: Vector, turning: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows (m, 3) and their bounds in m/s (m) for the velocity of R's tip.
 
@@ -57,11 +59,11 @@ def organ_rows(
         organs: The organs.
         g: Fulcrum G_R, m.
         p: Tip of R, m.
+        turning: Greatest speed of the tip across the shaft, m/s.
     """
     shaft = sub(p, g)
     q = norm(shaft)
-    u = along((0.0, 0.0, 0.0), 1.0 / q, shaft)
-    turning = q * params.turning_speed
+    u = over(shaft, q)
     count = len(organs.table)
     rows, bounds = np.empty((_MOST * count, 3)), np.empty(_MOST * count)
     last = 0

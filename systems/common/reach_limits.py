@@ -64,3 +64,15 @@ def lever(limits: Any, q: float) -> float:
         q: In m.
     """
     return q / max(limits.shaft_length - q, 0.01)
+
+
+@compiled
+def fastest_sideways(limits: Any, q: float, turning_speed: float) -> float:
+    """Greatest speed of the tip across the shaft, of which q is inside, in m/s.
+
+    Args:
+        limits: A record with what `ReachLimits` says.
+        q: In m.
+        turning_speed: Of the shaft, in rad/s.
+    """
+    return min(q * turning_speed, lever(limits, q) * limits.wrist_speed)

@@ -32,7 +32,7 @@ from systems.common.geometry import (
     unit,
 )
 from systems.common.parameter import Rules, check, parameter
-from systems.common.reach_limits import ReachLimits, lever
+from systems.common.reach_limits import ReachLimits, fastest_sideways, lever
 from systems.common.signal import Field, Many, Vector, example, vector
 from systems.common.signals import (
     CALM,
@@ -210,7 +210,7 @@ def limit_tip_velocity(
     scale = 1.0
     if speed > fastest:
         scale = fastest / speed
-    most = min(q * params.turning_speed, lever(params, q) * params.wrist_speed)
+    most = fastest_sideways(params, q, params.turning_speed)
     if turning * scale > most:
         scale = most / turning
     v = scaled(scale, v_WP)

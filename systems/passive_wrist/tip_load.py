@@ -23,7 +23,6 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     Vector,
@@ -36,9 +35,9 @@ from systems.common.geometry import (
     sub,
 )
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, finiteness, view
+from systems.common.signal import Field, finiteness, flat, size, view
 from systems.common.signals import Fulcrum, ShaftMotion, Wrench
-from systems.common.step_block import wired
+from systems.common.step_block import StepBlock, wired
 from systems.passive_wrist.wall_model import lateral_basis
 
 finite_shaft, finite_wrench = finiteness(ShaftMotion), finiteness(Wrench)
@@ -70,6 +69,11 @@ class State(NamedTuple):
     f: Vector
     contact: float
     lasted: float
+
+
+_PARTS = np.cumsum([size(State), 3])
+_MEMORY = size(State) + 3 + 9
+"""Elements of the memory: `State`, k and c, and their covariance."""
 
 
 @dataclass
@@ -216,7 +220,7 @@ def _step(
     return state, x, P.copy().reshape(9), wall, tip
 
 
-class TipLoad(Block):
+class TipLoad(StepBlock):
     """Parts the wrist's wrench into the wall's and the tip's.
 
     Port ``shaft`` accepts the `ShaftMotion`.
@@ -242,9 +246,9 @@ class TipLoad(Block):
         self._wrench = self.signal_in("wrench", Wrench)
         self._estimate = self.signal_in("estimate", Fulcrum)
         k, c = params.first_stiffness, 0.1
-        start = np.zeros(5 + 3 + 9)
-        start[8:] = np.diag([k * k + 1e-12, c * c, c * c]).ravel()
-        self.DeclareDiscreteState(start)
+        P = np.diag([k * k + 1e-12, c * c, c * c])
+        untouched = State((0.0, 0.0, 0.0), 0.0, 0.0)
+        self.DeclareDiscreteState([*flat(untouched), *np.zeros(3), *P.ravel()])
         self.DeclareDiscreteState([*guess, 0.02])
         self._run = wired(
             _step,
@@ -256,14 +260,12 @@ class TipLoad(Block):
         )
         reads = {self.xd_ticket(), self._shaft.ticket(), self._wrench.ticket()}
         self._next = self.cached("next", self._calc_next, reads)
-        told = {self._next.ticket()}
-        self.signal_out("wall", Wrench, lambda c: self._next.Eval(c)[17:24], told)
-        self.signal_out("tip_force", TipForce, lambda c: self._next.Eval(c)[24:], told)
+        self._emit(self._next, {"wall": Wrench, "tip_force": TipForce}, _MEMORY)
         self.update_every(params.period, self._calc_update)
 
     def _calc_next(self, context: Any) -> np.ndarray:
         state = context.get_discrete_state(0).value()
-        parts = state[:5], state[5:8], state[8:]
+        parts = np.split(state, _PARTS)
         told = context.get_discrete_state(1).value()
         after: np.ndarray = self._run(
             self._constants,
@@ -279,4 +281,4 @@ class TipLoad(Block):
         known = np.array([*told.p, told.sigma_along])
         if not np.isfinite(known).all():
             known = context.get_discrete_state(1).value().copy()
-        return [self._next.Eval(context)[:17], known]
+        return [self._next.Eval(context)[:_MEMORY], known]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,31 @@ from tests.benchmarks.sensed import Sensed, Senses
 Command = tuple[float, float, bool]
 """Velocity v_x, v_y [m/s], and whether the body may retreat backwards."""
 
-Step = Callable[[float, float, float, float, float, list[Seen], list[Corner]], Command]
-"""(x, y, heading, v_x, v_y, obstacles in sight, corners) -> what to do."""
+
+class Now(NamedTuple):
+    """What the robot knows: pose [m, rad], velocity [m/s], who and what is in sight."""
+
+    x: float
+    y: float
+    theta: float
+    vx: float
+    vy: float
+    seen: list[Seen]
+    corners: list[Corner]
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where it is [m]."""
+        return self.x, self.y
+
+    @property
+    def v(self) -> tuple[float, float]:
+        """Its velocity [m/s]."""
+        return self.vx, self.vy
+
+
+Step = Callable[[Now], Command]
+"""What to do now."""
 
 REACH = 0.2
 """Of the true goal [m], for a robot that only believes to be there."""
@@ -130,7 +153,7 @@ def run(
             place, seen, hiding = sensed.at((x, y, theta), (vx, vy), frame, k * dt)
         astray = max(astray, hypot(place[0] - x, place[1] - y))
         start = perf_counter()
-        wanted = step(*place, vx, vy, seen, hiding)
+        wanted = step(Now(*place, vx, vy, seen, hiding))
         walls.append(perf_counter() - start)
         if robot.holonomic:
             size = hypot(wanted[0], wanted[1])

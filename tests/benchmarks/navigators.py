@@ -14,7 +14,6 @@ from plants.crowd.signals import Obstacle
 from plants.crowd.social_force import social_force_towards
 from systems.switching.arcs import Disc, time_to_enter
 from systems.switching.classical_planner import ClassicalParams, summed_fields
-from systems.switching.signals import Corner, Seen
 from systems.switching.statechart_planner import (
     Manoeuvre,
     StatechartParams,
@@ -22,7 +21,7 @@ from systems.switching.statechart_planner import (
 )
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import SwitchingParams, SwitchingState
-from tests.benchmarks.navigation_loop import Command, Planner, Step
+from tests.benchmarks.navigation_loop import Command, Now, Planner, Step
 from tests.benchmarks.navigation_scenes import Scene
 
 MARGIN = 0.1
@@ -41,17 +40,11 @@ def switching(scene: Scene) -> Step:
     )
     state = SwitchingState()
 
-    def step(
-        x: float,
-        y: float,
-        theta: float,
-        vx: float,
-        vy: float,
-        seen: list[Seen],
-        corners: list[Corner],
-    ) -> Command:
+    def step(now: Now) -> Command:
         nonlocal state
-        result = plan(params, state, (x, y), (vx, vy), scene.goal, seen, corners)
+        result = plan(
+            params, state, now.place, now.v, scene.goal, now.seen, now.corners
+        )
         state = result.state
         return result.v_x, result.v_y, result.retreat
 
@@ -65,17 +58,9 @@ def noisy(position: float = 0.05, velocity: float = 0.1) -> Planner:
     def make(scene: Scene) -> Step:
         inner = switching(scene)
 
-        def step(
-            x: float,
-            y: float,
-            theta: float,
-            vx: float,
-            vy: float,
-            seen: list[Seen],
-            corners: list[Corner],
-        ) -> Command:
+        def step(now: Now) -> Command:
             shown = []
-            for o in seen:
+            for o in now.seen:
                 a, b, u, v = generator.normal(size=4)
                 shown.append(
                     o._replace(
@@ -85,17 +70,17 @@ def noisy(position: float = 0.05, velocity: float = 0.1) -> Planner:
                         v_y=o.v_y + velocity * v,
                     )
                 )
-            return inner(x, y, theta, vx, vy, shown, corners)
+            return inner(now._replace(seen=shown))
 
         return step
 
     return make
 
 
-def _retreats(scene: Scene, x: float, y: float, seen: list[Seen]) -> bool:
+def _retreats(scene: Scene, now: Now) -> bool:
     moving = [
-        Disc(o.track, x - o.x, y - o.y, o.radius, o.v_x, o.v_y)
-        for o in seen
+        Disc(o.track, now.x - o.x, now.y - o.y, o.radius, o.v_x, o.v_y)
+        for o in now.seen
         if o.v_x or o.v_y
     ]
     clearance = scene.robot.radius + 2.0 * MARGIN
@@ -106,17 +91,9 @@ def classical(scene: Scene) -> Step:
     """Khatib's sum."""
     params = ClassicalParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
 
-    def step(
-        x: float,
-        y: float,
-        theta: float,
-        vx: float,
-        vy: float,
-        seen: list[Seen],
-        corners: list[Corner],
-    ) -> Command:
-        velocity = summed_fields(params, (x, y), scene.goal, seen)
-        return *velocity, _retreats(scene, x, y, seen)
+    def step(now: Now) -> Command:
+        velocity = summed_fields(params, now.place, scene.goal, now.seen)
+        return *velocity, _retreats(scene, now)
 
     return step
 
@@ -126,18 +103,12 @@ def statechart(scene: Scene) -> Step:
     params = StatechartParams(body_radius=scene.robot.radius, speed=scene.robot.speed)
     memory = Manoeuvre()
 
-    def step(
-        x: float,
-        y: float,
-        theta: float,
-        vx: float,
-        vy: float,
-        seen: list[Seen],
-        corners: list[Corner],
-    ) -> Command:
+    def step(now: Now) -> Command:
         nonlocal memory
-        ux, uy, memory = statechart_step(params, memory, (x, y), scene.goal, seen)
-        return ux, uy, _retreats(scene, x, y, seen)
+        ux, uy, memory = statechart_step(
+            params, memory, now.place, scene.goal, now.seen
+        )
+        return ux, uy, _retreats(scene, now)
 
     return step
 
@@ -148,32 +119,24 @@ def orca(scene: Scene) -> Step:
 
     robot = scene.robot
 
-    def step(
-        x: float,
-        y: float,
-        theta: float,
-        vx: float,
-        vy: float,
-        seen: list[Seen],
-        corners: list[Corner],
-    ) -> Command:
+    def step(now: Now) -> Command:
         world = pyrvo.RVOSimulator()
         world.set_time_step(scene.dt)
         world.set_agent_defaults(10.0, 20, 5.0, 5.0, robot.radius, robot.speed)
-        world.add_agent([x, y])
-        world.set_agent_velocity(0, [vx, vy])
+        world.add_agent([*now.place])
+        world.set_agent_velocity(0, [*now.v])
         world.set_agent_radius(0, robot.radius + MARGIN)
-        gx, gy = scene.goal[0] - x, scene.goal[1] - y
+        gx, gy = scene.goal[0] - now.x, scene.goal[1] - now.y
         size = max((gx * gx + gy * gy) ** 0.5, 1e-9)
         speed = min(robot.speed, 2.0 * size)
         world.set_agent_pref_velocity(0, [speed * gx / size, speed * gy / size])
-        for k, (_, a, b, r, u, v) in enumerate(seen, start=1):
+        for k, (_, a, b, r, u, v) in enumerate(now.seen, start=1):
             world.add_agent([a, b])
             world.set_agent_radius(k, r)
             world.set_agent_velocity(k, [u, v])
         world.do_step()
         chosen = world.get_agent_velocity(0)
-        return chosen.x, chosen.y, _retreats(scene, x, y, seen)
+        return chosen.x, chosen.y, _retreats(scene, now)
 
     return step
 
@@ -191,24 +154,16 @@ def hrvo(scene: Scene) -> Step:
     behavior.horizon = 5.0
     behavior.target = core.Target.Point(scene.goal, 0.5 * robot.reach)
 
-    def step(
-        x: float,
-        y: float,
-        theta: float,
-        vx: float,
-        vy: float,
-        seen: list[Seen],
-        corners: list[Corner],
-    ) -> Command:
-        behavior.pose = core.Pose2((x, y), 0.0)
-        behavior.twist = core.Twist2((vx, vy), 0.0)
+    def step(now: Now) -> Command:
+        behavior.pose = core.Pose2(now.place, 0.0)
+        behavior.twist = core.Twist2(now.v, 0.0)
         behavior.environment_state.neighbors = [
             core.Neighbor(np.array([a, b]), r, np.array([u, v]), int(i))
-            for i, a, b, r, u, v in seen
+            for i, a, b, r, u, v in now.seen
         ]
         twist = behavior.compute_cmd(scene.dt)
         ux, uy = twist.velocity
-        return float(ux), float(uy), _retreats(scene, x, y, seen)
+        return float(ux), float(uy), _retreats(scene, now)
 
     return step
 
@@ -219,29 +174,21 @@ def crowds(model: str) -> Planner:
     def make(scene: Scene) -> Step:
         robot = scene.robot
 
-        def step(
-            x: float,
-            y: float,
-            theta: float,
-            vx: float,
-            vy: float,
-            seen: list[Seen],
-            corners: list[Corner],
-        ) -> Command:
-            me = Obstacle(x, y, robot.radius + MARGIN, vx, vy)
-            others = [Obstacle(*o[1:]) for o in seen]
+        def step(now: Now) -> Command:
+            me = Obstacle(*now.place, robot.radius + MARGIN, *now.v)
+            others = [Obstacle(*o[1:]) for o in now.seen]
             if model == "social_force":
                 (v,) = social_force_towards(
                     [me, *others], [scene.goal], robot.speed, scene.dt
                 )
-                return *v, _retreats(scene, x, y, seen)
-            others.sort(key=lambda o: hypot(o.x - x, o.y - y))
-            gx, gy = scene.goal[0] - x, scene.goal[1] - y
+                return *v, _retreats(scene, now)
+            others.sort(key=lambda o: hypot(o.x - now.x, o.y - now.y))
+            gx, gy = scene.goal[0] - now.x, scene.goal[1] - now.y
             size = max(hypot(gx, gy), 1e-9)
             pace = min(robot.speed, 2.0 * size) / size
             wanted = (pace * gx, pace * gy)
             v = orca_velocity(me, others[:20], wanted, robot.speed, 5.0, scene.dt)
-            return *v, _retreats(scene, x, y, seen)
+            return *v, _retreats(scene, now)
 
         return step
 

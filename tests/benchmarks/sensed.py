@@ -5,7 +5,7 @@ from math import hypot
 
 import numpy as np
 
-from plants.crowd.signals import Obstacle
+from plants.crowd.signals import CAPACITY, Obstacle
 from plants.crowd.walls import segments
 from plants.turtlebot.lidar import RAYS, LidarParams, scan_of
 from plants.turtlebot.lidar import constants as lidar_constants
@@ -23,8 +23,6 @@ from systems.perception.grid_mapping import (
 from systems.perception.place import Belief
 from systems.perception.signals import GRID
 from systems.perception.tracking import (
-    CAPACITY,
-    TRACK_SIZE,
     TrackingParams,
     corners,
     sight,
@@ -32,6 +30,7 @@ from systems.perception.tracking import (
     walking,
 )
 from systems.perception.tracking import constants as tracking_constants
+from systems.perception.tracks import TRACK_SIZE
 from systems.switching.signals import Corner, Seen
 from tests.benchmarks.navigation_scenes import Frame, Scene
 

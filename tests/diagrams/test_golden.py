@@ -13,9 +13,8 @@ LONG = {
 
 
 def marks(row):
-    """A row runs where the tests of its system do, which have run it already."""
-    group = pytest.mark.xdist_group(GOLDEN[row]["system"])
-    return [group, pytest.mark.study] if row in LONG else [group]
+    """Long rows are studies."""
+    return [pytest.mark.study] if row in LONG else []
 
 
 @pytest.mark.parametrize("row", [pytest.param(r, marks=marks(r)) for r in GOLDEN])

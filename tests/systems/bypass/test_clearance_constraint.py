@@ -10,8 +10,8 @@ from systems.bypass.clearance_constraint import (
     ClearanceConstraint,
     ClearanceConstraintParams,
     constrain,
-    distance_rate,
 )
+from systems.bypass.distance_rate import distance_rate
 from systems.bypass.obstacle_tools import Margins
 from systems.bypass.shadow_body import ObstacleTool, pose_distance, read_tool
 from systems.bypass.workspace import WorkspaceParams

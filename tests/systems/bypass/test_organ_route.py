@@ -94,7 +94,7 @@ def test_behind_an_organ_it_waits_before_it_and_says_so(lobe):
 
 def test_rows_tell_how_the_distance_changes(lobe):
     p, rng = np.array([-0.02, 0.0, -0.083]), np.random.default_rng(0)
-    rows, bounds = organ_rows(ROWS, lobe, G, tuple(p))
+    rows, bounds = organ_rows(ROWS, lobe, G, tuple(p), 0.1)
     assert len(rows) > 0
     k, h = 0, 1e-4  # the nearest to the tip
     for v in rng.normal(0.0, 1.0, (5, 3)):
@@ -105,8 +105,8 @@ def test_rows_tell_how_the_distance_changes(lobe):
 
 def test_an_organ_that_comes_asks_to_give_way(lobe):
     p = (-0.02, 0.0, -0.083)
-    rows, still = organ_rows(ROWS, lobe, G, p)
+    rows, still = organ_rows(ROWS, lobe, G, p, 0.1)
     rising = lobe._replace(moved=np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 0.02]]))
-    _, bounds = organ_rows(ROWS, rising, G, p)
+    _, bounds = organ_rows(ROWS, rising, G, p, 0.1)
     assert len(rows) == len(bounds)
     assert (bounds > still).any()

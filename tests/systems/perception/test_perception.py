@@ -10,12 +10,13 @@ from plants.turtlebot.lidar import RAYS, LidarParams, scan_of
 from plants.turtlebot.lidar import constants as lidar_constants
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.signal import size, view
-from systems.perception import grid_mapping, tracking
+from systems.perception import grid_mapping, tracking, tracks
 from systems.perception.grid import OCCUPIED
 from systems.perception.grid_mapping import GridMappingParams
 from systems.perception.place import Belief
 from systems.perception.signals import CELLS, GRID
-from systems.perception.tracking import Track, TrackingParams, matched
+from systems.perception.tracking import TrackingParams
+from systems.perception.tracks import Track, matched
 from systems.switching.signals import STANDING
 
 ROOM = [WallParams([[-3, -3], [5, -3], [5, 3], [-3, 3], [-3, -3]])]
@@ -34,7 +35,7 @@ class World:
         params = TrackingParams(person=person)
         self.k_track = tracking.constants(params, MAPPING)
         self.belief, self.grid = np.zeros(size(Belief)), np.zeros(size(GRID))
-        self.tracks = np.zeros(tracking.CAPACITY * tracking.TRACK_SIZE)
+        self.tracks = np.zeros(tracking.CAPACITY * tracks.TRACK_SIZE)
         self.stamp, self.time = np.zeros(2), 0.0
         self.rng = np.random.default_rng(5)
 
@@ -57,7 +58,7 @@ class World:
 
     def all(self) -> list[Track]:
         """Tracks, whether they move or not."""
-        rows = self.tracks.reshape(-1, tracking.TRACK_SIZE)
+        rows = self.tracks.reshape(-1, tracks.TRACK_SIZE)
         return [Track(*row) for row in rows if row[0] > 0.0]
 
     def moving(self) -> list[Track]:
@@ -154,7 +155,7 @@ def test_the_place_is_put_right_in_a_room_and_unsure_along_a_corridor():
 
 
 def test_the_cheapest_matches_in_all_are_taken():
-    table = np.full((4, 3), tracking.FORBIDDEN)
+    table = np.full((4, 3), tracks.FORBIDDEN)
     table[0, 0], table[0, 1], table[2, 0] = 1.0, 2.0, 3.5
     np.testing.assert_array_equal(matched(table), [1, -1, 0, -1])
     assert (matched(table[:, :0]) == -1).all()
