@@ -72,7 +72,7 @@ def test_clearance_and_force_are_drawn():
     [
         ("wrist=known", "expected 'pwe' with press.active"),
         ("tip_load.active=true", "tip_load.active=True: expected False with press"),
-        ("organs=[]", "expected organs to press on"),
+        ("organs=[]", "expected one to press on"),
         ("organs=[{name: liver, file: nowhere.stl}]", "expected a file"),
         ("organs=[{name: liver, shape: spleen}]", "one of liver"),
         ("organs=[{name: target}]", "expected names that differ"),
