@@ -9,8 +9,6 @@ from diagrams.studies import load_scenario
 from systems.motion.tissue_press import Phase
 from tests.runs import run
 
-pytestmark = pytest.mark.xdist_group("gauze")
-
 
 def test_the_lobe_is_passed_and_nothing_touched():
     figures = run("gauze_organs").metrics
