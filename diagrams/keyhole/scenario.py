@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.bedside.bedside import ToolAtStart
+from diagrams.bedside.wrist import CLOCKED as WRIST_CLOCKED
 from diagrams.bedside.wrist import WristSettings
 from diagrams.common.scenario import Scenario, ScenarioError
 from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
@@ -32,6 +33,7 @@ from systems.keyhole.snake_task import SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.navigation_monitor import NavigationMonitorParams
 from systems.passive_wrist.wrist_law import WristParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
@@ -46,7 +48,7 @@ PERIOD = 1.0 / 60.0
 """Of all blocks, the tracker's."""
 CLOCKED = (
     *("joints", "operation", "organ_estimator", "phases", "tube_task", "snake_task"),
-    *("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"),
+    *WRIST_CLOCKED,
 )
 """Blocks that share their instants."""
 BASE = 2e-3
@@ -200,6 +202,7 @@ class KeyholeScenario(Scenario, WristSettings):
     snake_task: SnakeTaskParams = clocked(SnakeTaskParams)
     tool_wrench: ToolWrenchParams = clocked(ToolWrenchParams)
     wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
+    navigation_monitor: NavigationMonitorParams = clocked(NavigationMonitorParams)
     # Half of an instrument's: the snake's couplers feel what the tube's end does.
     passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
     circle: CircleParams = part(CircleParams)
