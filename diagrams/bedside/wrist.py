@@ -1,15 +1,15 @@
 """Figure 2's "passive wrist emulation control", for every diagram that has an arm."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.bedside.bedside import Bedside
-from diagrams.common.scenario import ScenarioError
 from plants.abdomen.wall_motion import WallMotionParams
 from plants.instruments.tip_push import TipPushParams
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part
 from systems.common.signals import (
     Fulcrum,
     MovingPoint,
@@ -138,24 +138,24 @@ class WristSettings:
     passive_wrist: WristParams = part(WristParams)
     navigation_monitor: NavigationMonitorParams = part(NavigationMonitorParams)
 
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        yield from share_instants(self, WRIST_BLOCKS)
 
-CLOCKED = (
+
+WRIST_BLOCKS = (
     *("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"),
     "navigation_monitor",
 )
-"""Blocks that share the joints' instants."""
+"""They share the joints' instants."""
 
 
-def check_wrist(scenario: Any) -> None:
-    """Raises ScenarioError for wrist settings that do not go together."""
+def share_instants(scenario: Any, names: Iterable[str]) -> Rules:
+    """Blocks that share the joints' instants have their period."""
     period = scenario.joints.period
-    for name in CLOCKED:
-        own = getattr(scenario, name).period
-        if abs(own - period) > 1e-9:
-            raise ScenarioError(
-                f"{name}.period={own} s: expected joints.period={period} s; sensor, "
-                "estimator, wrist, monitor and joints share their instants"
-            )
+    for name in names:
+        shared = abs(getattr(scenario, name).period - period) <= 1e-9
+        yield shared, f"{name}.period", f"joints.period={period} s, shared by both"
 
 
 def add_wrist(
@@ -206,7 +206,7 @@ def add_wrist(
             push.get_output_port(),
             systems["wrist_sensor"].GetInputPort("applied_spatial_force"),
         )
-    new = [name for name in CLOCKED if name != "tool_wrench"]
+    new = [name for name in WRIST_BLOCKS if name != "tool_wrench"]
     tip = getattr(scenario, "tip_load", TipLoadParams())
     if tip.active:
         told = replace(tip, length=scenario.instrument.length, period=sensor.period)

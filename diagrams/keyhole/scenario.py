@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import CLOCKED as WRIST_CLOCKED
-from diagrams.bedside.wrist import WristSettings
+from diagrams.bedside.wrist import WRIST_BLOCKS, WristSettings, share_instants
 from diagrams.common.scenario import Scenario, ScenarioError
-from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
+from diagrams.gauze.scenario import GauzeScenario, tool_rules
 from diagrams.gauze.tools import CameraTool
 from diagrams.resection.scenario import ResectionScenario
-from diagrams.resection.scenario import check as check_resection
 from plants.abdomen.abdomen import AbdomenParams
 from plants.abdomen.organ_motion import OrganMotionParams
 from plants.arm.arm import ArmParams
@@ -48,7 +46,7 @@ PERIOD = 1.0 / 60.0
 """Of all blocks, the tracker's."""
 CLOCKED = (
     *("joints", "operation", "organ_estimator", "phases", "tube_task", "snake_task"),
-    *WRIST_CLOCKED,
+    *WRIST_BLOCKS,
 )
 """Blocks that share their instants."""
 BASE = 2e-3
@@ -167,6 +165,10 @@ class Theatre(GauzeScenario):
 
     margins: WideMargins = part(WideMargins)
 
+    def rules(self) -> Rules:
+        """Those of its tools count only where they are there, see `others`."""
+        yield from ()
+
 
 @dataclass
 class Entry:
@@ -216,8 +218,20 @@ class KeyholeScenario(Scenario, WristSettings):
 
     def rules(self) -> Rules:
         """What must hold across fields."""
-        standoff, gap = self.tube_task.standoff, self.instrument.gap
-        yield standoff >= gap, "tube_task", f"standoff >= instrument.gap={gap} m"
+        gap = self.instrument.gap
+        far = self.tube_task.standoff >= gap
+        yield far, "tube_task.standoff", f">= instrument.gap={gap} m"
+        yield from share_instants(self, CLOCKED)
+        yield from reach_rules(self)
+        if self.task == "resect":
+            yield from clearance_rules(self)
+        if self.task == "circle":
+            circle_postures(self)
+        if self.others:
+            for holds, key, expected in tool_rules(self.surgeon):
+                yield holds, f"theatre.{key}", expected
+        if self.organ_motion.recording:
+            load_recording(self.organ_motion.recording)
 
     @property
     def axis(self) -> np.ndarray:
@@ -292,56 +306,25 @@ def circle_postures(scenario: KeyholeScenario) -> tuple[np.ndarray, np.ndarray]:
     return np.array([one.x for one in solved]), times
 
 
-def check(scenario: KeyholeScenario) -> None:
-    """Raises ScenarioError for a scenario that cannot run."""
-    check_resection(scenario.operation)
-    period = scenario.joints.period
-    for name in CLOCKED:
-        own = getattr(scenario, name).period
-        if abs(own - period) > 1e-9:
-            raise ScenarioError(
-                f"{name}.period={own} s: expected joints.period={period} s; arm, wrist "
-                "and snake share their instants"
-            )
-    _check_reach(scenario)
-    if scenario.task == "resect":
-        _check_clearance(scenario)
-    if scenario.task == "circle":
-        circle_postures(scenario)
-    if scenario.others:
-        check_tools(scenario.surgeon)
-        check_fulcrums(scenario.surgeon)
-    if scenario.organ_motion.recording:
-        load_recording(scenario.organ_motion.recording)
-
-
-def _check_reach(scenario: KeyholeScenario) -> None:
-    """Tube and trocar must reach the station, at rest and over a breath."""
-    limits, length = ReachLimits(), scenario.instrument.length
-    p_WG, p_WE = np.array(scenario.robot.p_WG), np.array(scenario.entry.p_WE)
-    depth = float(np.linalg.norm(p_WE - p_WG))
+def reach_rules(scenario: KeyholeScenario) -> Rules:
+    """Tube and trocar reach the station, at rest and over a breath."""
+    limits, tube = ReachLimits(), scenario.instrument
+    depth = math.dist(scenario.entry.p_WE, scenario.robot.p_WG)
     tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
-    least = depth - scenario.tube_task.standoff
-    most = depth - scenario.instrument.gap
-    if tilt > limits.max_tilt:
-        raise ScenarioError(
-            f"entry.p_WE={scenario.entry.p_WE}: it lies {math.degrees(tilt):.0f} deg "
-            f"off the vertical of the trocar, expected at most "
-            f"{math.degrees(limits.max_tilt):.0f}; {better_trocars(scenario)}"
-        )
-    if not (limits.min_insertion <= least and most <= limits.max_insertion):
-        low = limits.min_insertion + scenario.tube_task.standoff
-        high = limits.max_insertion + scenario.instrument.gap
-        raise ScenarioError(
-            f"entry.p_WE={scenario.entry.p_WE}: it lies {depth:.3f} m from the trocar, "
-            f"expected {low:.3f} to {high:.3f}; {better_trocars(scenario)}"
-        )
-    if length - scenario.instrument.mount_length < most + 0.02:
-        raise ScenarioError(
-            f"instrument.length={length} m: the tube is too short, the mount would "
-            f"meet the trocar; expected >= "
-            f"{most + 0.02 + scenario.instrument.mount_length:.3f}"
-        )
+    low = limits.min_insertion + scenario.tube_task.standoff
+    high = limits.max_insertion + tube.gap
+    told = (
+        f"it within {math.degrees(limits.max_tilt):.0f} deg of the trocar's vertical, "
+        f"not {math.degrees(tilt):.0f}; "
+    )
+    near = tilt <= limits.max_tilt
+    yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
+    near = low <= depth <= high
+    told = f"it {low:.3f} to {high:.3f} m from the trocar, not {depth:.3f}; "
+    yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
+    least = depth - tube.gap + 0.02 + tube.mount_length
+    told = f">= {least:.3f}: the tube is too short, its mount would meet the trocar"
+    yield tube.length >= least, "instrument.length", told
 
 
 def tube_tilt(scenario: KeyholeScenario) -> float:
@@ -356,27 +339,21 @@ def tube_tilt(scenario: KeyholeScenario) -> float:
     return most
 
 
-def _check_clearance(scenario: KeyholeScenario) -> None:
-    """The plan must have room for what the tube's tilt does to the snake's body."""
+def clearance_rules(scenario: KeyholeScenario) -> Rules:
+    """The plan has room for what the tube's tilt does to the snake's body."""
     o, angle, gap = scenario.operation, tube_tilt(scenario), scenario.instrument.gap
-    if scenario.phases.deviation > o.clearance:
-        raise ScenarioError(
-            f"phases.deviation={scenario.phases.deviation} m: expected <= "
-            f"operation.clearance={o.clearance} m, the room that the plan has"
-        )
+    room = f"<= operation.clearance={o.clearance} m, the room that the plan has"
+    yield scenario.phases.deviation <= o.clearance, "phases.deviation", room
     c, s = math.cos(angle), math.sin(angle)
     E = pose_of((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     C = pose_of((gap * s, 0.0, gap * (c - 1.0)), (c, 0.0, -s), (s, 0.0, c))
-    snake = o.snake
-    geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
+    geometry = o.snake.half_pitch, o.snake.tool_offset, o.snake.max_bend
     away = body_deviation(np.array(BENT), C, E, *geometry)
-    if away > o.clearance:
-        raise ScenarioError(
-            f"operation.clearance={o.clearance} m: wall and organ tilt the tube by "
-            f"{math.degrees(angle):.1f} deg over a breath, which bends the snake's "
-            f"body off its plan by {away:.2g} m; expected at least that, or motions "
-            "more in phase"
-        )
+    told = (
+        f">= {away:.2g} m, by which the body leaves its plan when wall and organ tilt "
+        f"the tube by {math.degrees(angle):.1f} deg; or motions more in phase"
+    )
+    yield away <= o.clearance, "operation.clearance", told
 
 
 def better_trocars(scenario: KeyholeScenario) -> str:

@@ -273,7 +273,7 @@ def test_target_out_of_reach_stops_the_robot_until_it_comes_back():
 
 
 def test_a_start_out_of_the_arms_reach_is_refused():
-    with pytest.raises(ScenarioError, match=r"out of reach|no posture"):
+    with pytest.raises(ScenarioError, match=r"within reach|no posture"):
         simulate(load_scenario("gauze_static", ["robot.p_WG=[0.45, 0.0, 0.0]"]))
 
 
