@@ -19,7 +19,7 @@ from diagrams.gauze.tools import (
 )
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
-from plants.instruments.instrument import InstrumentParams
+from plants.instruments.instrument import DRY_GAUZE, InstrumentParams
 from plants.organs.organ_touch import OrganTouchParams
 from plants.organs.organs import Organ, surface_of
 from plants.surgeon.hunting_tool import Hunt
@@ -97,7 +97,8 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     navigation: ToolNavigationParams = part(ToolNavigationParams)
     joints: JointCommandsParams = part(JointCommandsParams)
     arm: ArmParams = part(ArmParams)
-    instrument: InstrumentParams = part(InstrumentParams)
+    # It carries the gauze from the start to S, and to the end of the run.
+    instrument: InstrumentParams = part(lambda: InstrumentParams(gauze_mass=DRY_GAUZE))
     abdomen: AbdomenParams = part(AbdomenParams)
 
     def of_role(self, role: str) -> list[Any]:

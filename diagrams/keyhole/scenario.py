@@ -31,6 +31,7 @@ from systems.keyhole.snake_task import SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.navigation_monitor import NavigationMonitorParams
 from systems.passive_wrist.wrist_law import WristParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
@@ -203,6 +204,7 @@ class KeyholeScenario(Scenario, WristSettings):
     snake_task: SnakeTaskParams = clocked(SnakeTaskParams)
     tool_wrench: ToolWrenchParams = clocked(ToolWrenchParams)
     wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
+    navigation_monitor: NavigationMonitorParams = clocked(NavigationMonitorParams)
     # Half of an instrument's: the snake's couplers feel what the tube's end does.
     passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
     circle: CircleParams = part(CircleParams)

@@ -214,7 +214,7 @@ OBSERVE = {
     *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
-    *("TissueForce", "WallWrench"),
+    *("NavigationMonitor", "TissueForce", "WallWrench"),
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}
