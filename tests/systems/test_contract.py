@@ -213,7 +213,14 @@ OBSERVE = {
     *("GridMapping", "Perception", "RobotLocation", "SnakeLoad", "SnakeLocation"),
     *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
-    *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
+    *(
+        "BallLocation",
+        "Registration",
+        "SensorZeroing",
+        "TipLoad",
+        "ToolLoad",
+        "WrenchWatch",
+    ),
     *("TissueForce", "WallWrench"),
 }
 """Blocks that command nothing."""
