@@ -139,6 +139,8 @@ class SteadyFulcrum(FulcrumParams):
     steady: bool = parameter(
         True, "whether it is kept from drifting along the shaft, over minutes"
     )
+    # A ventilator's wave is sharp; the arm runs ahead by the velocity that is foreseen.
+    harmonics: int = parameter(4, "of the breathing", least=1, most=4)
     period: float = parameter(PERIOD, "of the estimate", "s", above=0.0, most=0.1)
 
 
