@@ -54,7 +54,7 @@ def steady(metrics: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in metrics.items() if k not in WALL_CLOCK | RESUMED}
 
 
-def faults_of(out: Path, seed: int) -> list[str]:
+def faults_of(out: Path) -> list[str]:
     """What is wrong with the results in a folder."""
     found = []
     for path in out.rglob("*"):
@@ -68,13 +68,13 @@ def faults_of(out: Path, seed: int) -> list[str]:
             rows = list(csv.reader(path.open()))
             if len({len(row) for row in rows}) != 1:
                 found.append("signals.csv is cut off")
-        elif path.name == "scenario.yaml":
-            told = yaml.safe_load(path.read_text())
-            if told["seed"] != seed:
-                found.append("scenario.yaml is of the run before")
-    names = {path.name for path in out.iterdir()}
-    if "scenario.yaml" not in names and names & {"metrics.json", "replay.html"}:
+    told, figures = out / "scenario.yaml", out / "metrics.json"
+    if figures.exists() and not told.exists():
         found.append("results of the run before are left")
+    elif figures.exists():
+        seeds = {yaml.safe_load(path.read_text())["seed"] for path in (told, figures)}
+        if len(seeds) > 1:
+            found.append("two runs are mixed")
     return found
 
 
@@ -119,7 +119,7 @@ def main() -> None:
                 continue
             kills[case] += 1
             if out.is_dir():
-                wrong += [f"{case}: {text}" for text in faults_of(out, seed)]
+                wrong += [f"{case}: {text}" for text in faults_of(out)]
             if kills[case] % 5 == 0:
                 subprocess.run([*told[:-1], "1"], check=True, capture_output=True)
                 end = steady(json.loads((out / "metrics.json").read_text()))
