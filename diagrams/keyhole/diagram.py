@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import RandomSource
@@ -28,12 +29,17 @@ from systems.keyhole.station_target import StationTarget
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask
 from systems.motion.joint_commands import JointCommands
+from systems.passive_wrist.sensor_zero import SensorZeroing
 from systems.sensing.optical_tracker import OpticalTracker
 from systems.sensing.organ_estimator import OrganEstimator
 from systems.sensing.robot_location import RobotLocation
 
 KEYHOLE_WIRES = (
-    *WRIST_WIRES,
+    *(wire for wire in WRIST_WIRES if wire[1] != "wrench_watch.wrench"),
+    ("wrist_sensor.mount", "sensor_zero.mount"),
+    ("tool_wrench.wrench", "sensor_zero.wrench"),
+    ("fulcrum_estimator.estimate", "sensor_zero.estimate"),
+    ("sensor_zero.zeroed", "wrench_watch.wrench"),
     ("plant.pa10_state", "robot_location.arm_state"),
     ("passive_wrist.pivot", "robot_location.fulcrum"),
     ("plant.pa10_state", "joint_commands.arm_state"),
@@ -82,6 +88,7 @@ CARVER_WIRES = (("snake_in_organ.posture_E", "tissue_carver.posture"),)
 EXPORTS = WRIST_EXPORTS | {
     "robot.tool": "robot_location.robot_tool",
     "joints.status": "joint_commands.status",
+    "wrist.zero": "sensor_zero.zero",
     "wall.force": "wall_force.force",
     "wall.fulcrum_error": "wall_force.fulcrum_error",
     "operation.phase": "phases.phase",
@@ -170,6 +177,11 @@ def make_blocks(case: KeyholeCase, posture: Any) -> dict[str, Any]:
     blocks = {
         **drum_chain(o, snake, start, gravity=gravity),
         "snake_load": SnakeLoad(o.snake, o.drive, s.instrument),
+        "sensor_zero": SensorZeroing(
+            replace(s.sensor_zero, common=s.sensor_zero.common and s.joints.roll > 0.0),
+            np.add(s.robot.p_WG, s.first_guess).tolist(),
+            s.axis.tolist(),
+        ),
         "organ_tracker": OpticalTracker(s.organ_tracker, ["organ"]),
         "organ_noise": RandomSource(
             RandomDistribution.kGaussian, 6, s.organ_tracker.period

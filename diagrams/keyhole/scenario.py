@@ -32,6 +32,7 @@ from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.navigation_monitor import NavigationMonitorParams
+from systems.passive_wrist.sensor_zero import SensorZeroParams
 from systems.passive_wrist.wrist_law import WristParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import CircleParams, circle_target
@@ -46,6 +47,7 @@ PERIOD = 1.0 / 60.0
 """Of all blocks, the tracker's."""
 CLOCKED = (
     *("joints", "operation", "organ_estimator", "phases", "tube_task", "snake_task"),
+    "sensor_zero",
     *WRIST_BLOCKS,
 )
 """Blocks that share their instants."""
@@ -137,6 +139,8 @@ class SteadyFulcrum(FulcrumParams):
     steady: bool = parameter(
         True, "whether it is kept from drifting along the shaft, over minutes"
     )
+    # A ventilator's wave is sharp; the arm runs ahead by the velocity that is foreseen.
+    harmonics: int = parameter(4, "of the breathing", least=1, most=4)
     period: float = parameter(PERIOD, "of the estimate", "s", above=0.0, most=0.1)
 
 
@@ -203,13 +207,14 @@ class KeyholeScenario(Scenario, WristSettings):
     tube_task: TubeTaskParams = clocked(TubeTaskParams)
     snake_task: SnakeTaskParams = clocked(SnakeTaskParams)
     tool_wrench: ToolWrenchParams = clocked(ToolWrenchParams)
+    sensor_zero: SensorZeroParams = clocked(SensorZeroParams)
     wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
     navigation_monitor: NavigationMonitorParams = clocked(NavigationMonitorParams)
     # Half of an instrument's: the snake's couplers feel what the tube's end does.
     passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
     circle: CircleParams = part(CircleParams)
     operation: OrganOperation = part(OrganOperation)
-    joints: JointCommandsParams = clocked(JointCommandsParams)
+    joints: JointCommandsParams = clocked(JointCommandsParams, roll=2.1)
     arm: ArmParams = part(ArmParams)
     instrument: TubeParams = part(TubeParams)
     # Taken as 100 g: CENIC takes the bushing's damper explicitly, and h D / m must stay

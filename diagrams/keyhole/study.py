@@ -23,6 +23,7 @@ from systems.common.signals import Force, MovingPoint, RobotTool, Shaft
 from systems.keyhole.signals import BodyDeviation, Phase, SnakeStatus, TubeStatus
 from systems.motion.joint_commands import Status
 from systems.motion.tool_navigation import StopCode
+from systems.passive_wrist.sensor_zero import SensorZero
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
 from systems.resection.wires.wire_drums import Limited
@@ -32,6 +33,7 @@ from systems.sensing.organ_estimator import OrganMotion
 SIGNALS = WRIST_SIGNALS | {
     "robot.tool": RobotTool,
     "joints.status": Status,
+    "wrist.zero": SensorZero,
     "wall.force": Force,
     "wall.fulcrum_error": FulcrumError,
     "operation.phase": Phase,

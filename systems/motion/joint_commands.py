@@ -6,6 +6,7 @@ speeds, see `joint_velocity`.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import pi, sin
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -87,6 +88,11 @@ class JointCommandsParams:
     follow: float = parameter(
         2e-3, "how far the arm may stray from its command", "m", above=0, most=0.05
     )
+    # There and back: it turns what the wrist's sensor drifts by, and nothing else.
+    roll: float = parameter(
+        0.0, "of the tool about its shaft, as it works", "rad", least=0, most=4
+    )
+    roll_period: float = parameter(60.0, "of that", "s", least=5, most=1e4)
     limp_time: float = parameter(
         0.3, "that an arm which strayed stays limp", "s", least=0, most=10
     )
@@ -121,8 +127,8 @@ def tool_twist(
             as fast in rad/s.
 
     Returns:
-        Angular and translational velocity (w, v) in W [rad/s, m/s]; there is no
-        rotation about the shaft: the roll is kept.
+        Angular and translational velocity (w, v) in W [rad/s, m/s], without rotation
+        about the shaft.
     """
     ahead = now - tool.time
     rate = gain / period
@@ -165,6 +171,8 @@ def problem(
     p_WT, u_WT, J, weight = tool_state(arm, q)
     twist = (p_WT, u_WT, tool, time, period, constants.gain, constants.catch_up)
     w, v = tool_twist(*twist)
+    turn = 2.0 * pi / constants.roll_period
+    w = along(w, 0.5 * constants.roll * turn * sin(turn * time), u_WT)
     lever = _STILL
     if all_finite(fulcrum.p):
         lever = sub(fulcrum.p, p_WT)

@@ -16,7 +16,6 @@ from systems.common.geometry import (
     across,
     along,
     dot,
-    norm,
     over,
     plus,
     scaled,
@@ -42,7 +41,7 @@ from systems.passive_wrist.fulcrum_kernels import (
     update,
     write_entry,
 )
-from systems.passive_wrist.steady import leak, unbiased, unexplained
+from systems.passive_wrist.steady import leak
 
 Floats = np.ndarray
 
@@ -302,13 +301,7 @@ def advance(
         sigma = spread(P, a.u, 0.0)[1]
         turning *= min(max(sigma / _DEPTH_UNKNOWN - 1.0, 0.0), 1.0)
     if c.steady and known:
-        tip, v_tip = along(a.p, c.length, a.u), along(a.v, c.length, a.du)
-        rest = unexplained(steady, tip, v_tip, exp(x[LN_OMEGA]), c.period)
-        speed = norm(across(rest, a.u))
-        turning = min(max(speed / c.depth_speed - 1.0, 0.0), 1.0)
-        depth = dot(a.u, sub(xyz(x, 0), a.p))
-        f = unbiased(steady, a, depth, c.period)
-        a = Sample(a.p, a.u, a.v, a.du, f, a.m, a.damping, a.averaged, turning)
+        turning = 0.0
     seen = innovate(c, x, P, a)
     if seen.nis < 0.0:
         raise ValueError("fulcrum estimator: a covariance is not positive definite")

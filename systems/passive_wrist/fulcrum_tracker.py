@@ -181,7 +181,7 @@ class FulcrumTracker:
         axis /= sqrt(axis.dot(axis))
         lateral = place - place.dot(axis)[:, None] * axis
         noise = p.force_noise / sqrt(self._every) / stiffness
-        wave = self._waves(m, seen, axis)
+        wave = None if known and p.steady else self._waves(m, seen, axis)
         if wave is not None:
             same = fit_breathing(lateral, RECORD_PERIOD, p.harmonics, wave.rate)
             other = abs(log(2.0 * pi * wave.rate) - x[LN_OMEGA]) > _SAME_RATE

@@ -1,92 +1,34 @@
 """What keeps the fulcrum's estimate good for minutes, compiled.
 
 An unloaded shaft sees the fulcrum across itself alone: what lies along it is known from
-the shaft's turning. A tip that follows an organ turns the shaft at the breathing's own
-rate, and then mean depth and depth's breath are indistinguishable. The filter does not
-know that, takes the turning for a message, and drifts along the shaft by a quarter of a
-millimetre a second, until its estimate is refused. Four things mend it:
+the shaft's turning. A tip that follows an organ turns the shaft with the breathing, and
+what of the wall's wave the filter does not foresee (it has two harmonics, and a breath
+is not like the one before) is then explained as well by a depth at which the shaft does
+not move. The filter drifts there, or jumps, and a pivot that has to follow by
+centimetres passes the true fulcrum on its way. Once the wall's breath is known:
 
-- *gate*: an observer learns what of the tip's motion repeats with the breath (mean and
-  harmonics); only speed that it does not explain tells of the depth;
+- the shaft's turning tells nothing of the depth, a side force alone does;
 - *leak*: along the shaft the mean is drawn to the depth that was last told, and the
   breath to zero, so weakly that whatever is really seen prevails;
-- *bias*: force and moment belong to one contact; what they slowly disagree by is the
-  sensor's drift, and is taken from the force;
 - a *refusal* concerns the distance across the shaft alone.
-"""
 
-from math import cos, sin
+What the sensor drifts by is `sensor_zero`'s.
+"""
 
 import numpy as np
 
 from systems.common.compiled import compiled
-from systems.common.geometry import across, along, cross, dot, norm, over, sub, xyz
+from systems.common.geometry import dot, sub, xyz
 from systems.common.signal import Vector
-from systems.passive_wrist.fulcrum_kernels import LN_K, Sample
+from systems.passive_wrist.fulcrum_kernels import LN_K
 
 Floats = np.ndarray
-OVERTONES = 8
-"""Harmonics of the observer of the tip."""
-REFERENCE, BIAS, TOLD, TIP = 0, 1, 4, 5
-"""Places: depth last told in m, bias of the force in N (3), 1 once there is a depth,
-and the observer: mean (3), and two parts (3 each) a harmonic."""
-SIZE = TIP + 3 + 6 * OVERTONES
-_LEARNT = 8.0  # s: time constant of the observer
+REFERENCE, TOLD, SIZE = 0, 1, 2
+"""Places: depth last told in m, 1 once there is one; and their number."""
 _FOLLOWED = 2.0  # s: of the reference, while the depth is told
 _LEAK = 20.0  # s
 _LEAK_SIGMA = 0.010  # m
-_BIAS_TIME = 20.0  # s
-_BIAS_FORCE = 0.5  # N: over it force and moment disagree for other reasons as well
 _FARTHEST = 0.05  # m along the shaft
-
-
-@compiled
-def unexplained(s: Floats, p: Vector, v: Vector, omega: float, dt: float) -> Vector:
-    """Updates the observer of the tip; the velocity that it does not explain.
-
-    Args:
-        s: State of this module (SIZE), changed in place.
-        p: Place of the tip in m.
-        v: Its velocity in m/s.
-        omega: The breathing's angular rate in rad/s.
-        dt: Since the last update, in s.
-    """
-    if s[TOLD] == 0.0:
-        for i in range(3):
-            s[TIP + i] = p[i]
-    e = sub(p, xyz(s, TIP))
-    rest = v
-    for k in range(1, OVERTONES + 1):
-        at = TIP + 3 + 6 * (k - 1)
-        c, d = cos(k * omega * dt), sin(k * omega * dt)
-        for i in range(at, at + 3):
-            a, b = s[i], s[i + 3]
-            s[i], s[i + 3] = a * c - b * d, a * d + b * c
-        e = sub(e, xyz(s, at))
-        rest = along(rest, k * omega, xyz(s, at + 3))
-    for i in range(3):
-        s[TIP + i] += dt / _LEARNT * e[i]
-        for k in range(OVERTONES):
-            s[TIP + 3 + 6 * k + i] += 2.0 * dt / _LEARNT * e[i]
-    return rest
-
-
-@compiled
-def unbiased(s: Floats, a: Sample, depth: float, dt: float) -> Vector:
-    """The sample's force without its bias, which is learnt.
-
-    Args:
-        s: State of this module, changed in place.
-        a: The sample.
-        depth: Of the contact from the sensor in m.
-        dt: In s.
-    """
-    f = across(a.f, a.u)
-    if norm(f) < _BIAS_FORCE and depth > 0.05:
-        other = sub(sub(f, over(cross(a.m, a.u), depth)), xyz(s, BIAS))
-        for i in range(3):
-            s[BIAS + i] += dt / _BIAS_TIME * other[i]
-    return sub(a.f, across(xyz(s, BIAS), a.u))
 
 
 @compiled

@@ -215,6 +215,7 @@ OBSERVE = {
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
     *("NavigationMonitor", "TissueForce", "WallWrench"),
+    "SensorZeroing",
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}

@@ -161,6 +161,16 @@ def test_too_fast_a_command_is_reported_and_bounded():
     assert rows[-1][2][0] == 1.0
 
 
+def test_the_tool_rolls_about_its_shaft_alone():
+    params = JointCommandsParams(roll=0.5, roll_period=5.0)
+    ends = [follow(circle, 2.5, p)[-1][0] for p in (None, params)]
+    (_, p, u, _), (_, p_r, u_r, _) = map(kinematics, ends)
+    np.testing.assert_allclose(p_r, p, atol=1e-5)
+    np.testing.assert_allclose(u_r, u, atol=1e-4)
+    x, x_r = (TIP.CalcPoseInWorld(kinematics(q)[0]).rotation().col(0) for q in ends)
+    assert np.arccos(x @ x_r) == pytest.approx(0.5, abs=2e-3)
+
+
 def off_fulcrum(posture):
     """How far the shaft's line passes the origin, in m."""
     _, p, u, _ = kinematics(posture)

@@ -55,11 +55,12 @@ class Wall:
     stiffness: float = 500.0
     stiffer: float = 0.0
     damping: float = 5.0
+    excursion: Callable[[float], float] | None = None  # instead of rate and wave
 
     def position(self, t: float) -> list[float]:
         """True fulcrum in m."""
         phase = self.rate * t + self.phase
-        g = wave(self.wave, phase)
+        g = self.excursion(t) if self.excursion else wave(self.wave, phase)
         s = min(max((t - self.step_at) / self.step_time, 0.0), 1.0)
         r = min(max((t - self.rise_at) / self.rise_time, 0.0), 1.0)
         r = r * r * (3 - 2 * r)
