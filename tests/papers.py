@@ -91,10 +91,10 @@ PAPERS: dict[str, list[Row]] = {
         ),
         Row(
             "3 i): the force tells whether navigation is accurate, while it runs",
-            "",
-            "",
-            "",
-            NOT,
+            f"{WRIST}/navigation_monitor.py",
+            f"{BEDSIDE}::test_whether_navigation_is_accurate_is_said_while_it_runs",
+            "`wrist.accuracy` in `signals.csv`",
+            VARIANT,
         ),
         Row(
             "3 ii): breathing and air pressure move the fulcrum",
@@ -198,8 +198,29 @@ PAPERS: dict[str, list[Row]] = {
             "the same",
             FAITHFUL,
         ),
-        Row("5: the gauze's own weight and clearance", "", "", "", NOT),
-        Row("6: tissue collisions, camera interaction (future work)", "", "", "", NOT),
+        Row(
+            "5: the gauze's weight, which the wrist is told, and its clearance",
+            "plants/instruments/instrument.py",
+            f"{GAUZE}::test_gauze_has_its_weight_and_the_wrist_is_told_it",
+            "`min_gauze_clearance`",
+            VARIANT,
+        ),
+        Row(
+            "6: no tissue collisions (future in the paper)",
+            "systems/bypass/organ_route.py",
+            "tests/diagrams/gauze/test_organs.py::"
+            "test_the_lobe_is_passed_and_nothing_touched",
+            "`gauze_organs`",
+            VARIANT,
+        ),
+        Row(
+            "6: camera interaction (future in the paper)",
+            "systems/motion/camera_planner.py",
+            "tests/diagrams/gauze/test_camera.py::"
+            "test_it_moves_out_of_what_would_block_it",
+            "`camera_blocked`",
+            VARIANT,
+        ),
     ],
     "Thesis: potenziali artificiali alternati": [
         Row(

@@ -26,8 +26,8 @@ from systems.common.parameter import check, parameter
 
 GAUZE_RADIUS = 0.0045
 """Of the gauze in the jaw, the longest, m."""
-DRY_GAUZE, WET_GAUZE = 0.002, 0.02
-"""Its mass, kg."""
+DRY_GAUZE = 0.002
+"""Its mass, kg; wet it is 0.02."""
 
 
 @dataclass
