@@ -206,7 +206,9 @@ class KeyholeScenario(Scenario, WristSettings):
     sensor_zero: SensorZeroParams = clocked(SensorZeroParams)
     wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
     # Half of an instrument's: the snake's couplers feel what the tube's end does.
-    passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
+    passive_wrist: WristParams = clocked(
+        WristParams, wrist_acceleration=2.5, slides=True
+    )
     circle: CircleParams = part(CircleParams)
     operation: OrganOperation = part(OrganOperation)
     joints: JointCommandsParams = clocked(JointCommandsParams, roll=2.1)
