@@ -25,10 +25,10 @@ from plants.surgeon.recording import load_recording
 from plants.tissue.volume import Access
 from systems.bypass.obstacle_tools import Margins
 from systems.common.geometry import pose_of
-from systems.common.parameter import Rules, parameter, part
+from systems.common.parameter import parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
-from systems.keyhole.snake_task import SnakeTaskParams, body_deviation
+from systems.keyhole.snake_task import FAR, SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
@@ -218,11 +218,6 @@ class KeyholeScenario(Scenario, WristSettings):
     # below 2; with 20 g arm and trocar shake themselves up.
     abdomen: AbdomenParams = part(lambda: AbdomenParams(sleeve_mass=0.1))
 
-    def rules(self) -> Rules:
-        """What must hold across fields."""
-        standoff, gap = self.tube_task.standoff, self.instrument.gap
-        yield standoff >= gap, "tube_task", f"standoff >= instrument.gap={gap} m"
-
     @property
     def axis(self) -> np.ndarray:
         """z_E, from the trocar to the entry, both at rest, (3,)."""
@@ -323,6 +318,24 @@ def _check_reach(scenario: KeyholeScenario) -> None:
     """Tube and trocar must reach the station, at rest and over a breath."""
     limits, length = ReachLimits(), scenario.instrument.length
     p_WG, p_WE = np.array(scenario.robot.p_WG), np.array(scenario.entry.p_WE)
+    standoff, gap = scenario.tube_task.standoff, scenario.instrument.gap
+    if standoff < gap:
+        raise ScenarioError(
+            f"tube_task.standoff={standoff} m: expected >= instrument.gap={gap}, or "
+            "the tube would stand nearer than it works"
+        )
+    down = np.subtract(scenario.robot.p_WP, p_WG)
+    inside = float(np.linalg.norm(down))
+    if not (
+        limits.min_insertion <= inside <= limits.max_insertion
+        and -down[2] >= inside * math.cos(limits.max_tilt)
+    ):
+        raise ScenarioError(
+            f"robot.p_WP={scenario.robot.p_WP}: the tube's end must begin "
+            f"{limits.min_insertion} to {limits.max_insertion} m inside the trocar at "
+            f"{scenario.robot.p_WG}, at most {math.degrees(limits.max_tilt):.0f} deg "
+            "off its vertical"
+        )
     depth = float(np.linalg.norm(p_WE - p_WG))
     tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
     least = depth - scenario.tube_task.standoff
@@ -374,6 +387,12 @@ def _check_clearance(scenario: KeyholeScenario) -> None:
     snake = o.snake
     geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
     away = body_deviation(np.array(BENT), C, E, *geometry)
+    if away >= FAR:
+        raise ScenarioError(
+            f"organ_motion.breathing={scenario.organ_motion.breathing} m: wall and "
+            f"organ tilt the tube by {math.degrees(angle):.1f} deg over a breath, which "
+            "the snake cannot make up for; expected smaller motions, or more in phase"
+        )
     if away > o.clearance:
         raise ScenarioError(
             f"operation.clearance={o.clearance} m: wall and organ tilt the tube by "

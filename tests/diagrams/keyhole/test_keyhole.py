@@ -130,12 +130,22 @@ def test_replay_holds_the_organ():
         ),
         ("circle.radius=0.05", "circle: "),
         ("task=both", "task='both': expected one of circle, resect"),
-        ("tube_task.standoff=0.03", "standoff >= instrument.gap"),
+        ("tube_task.standoff=0.03", "standoff=0.03 m: expected >= instrument.gap=0.04"),
+        ("robot.p_WP=[0.0, 0.0, 0.05]", "must begin 0.03 to 0.2 m inside the trocar"),
+        ("robot.p_WP=[0.2, 0.0, -0.06]", "must begin .*at most .* deg off"),
+        ("entry.p_WE=[0.0, 0.0, 0.0]", "0.000 m from the trocar"),
+        ("entry.p_WE=[0.0, 0.0, 0.1]", "180 deg off.*no trocar at this height"),
+        ("sensor_zero.period=0.01", "share their instants"),
+        ("joints.roll=9", "joints.roll=9.0 rad: expected >= 0 and <= 4"),
         ("joints.period=0.01", "share their instants"),
         ("organ_motion.recording=nowhere.csv", "nowhere.csv"),
         (
             "task=resect organ_motion.lag=0.5",
             "operation.clearance=0.00015 m: wall and organ tilt the tube by .* deg",
+        ),
+        (
+            "task=resect organ_motion.breathing=[0.03, 0.0, 0.0]",
+            "20.5 deg over a breath, which the snake cannot make up for",
         ),
         (
             "task=resect operation.clearance=5e-05",
