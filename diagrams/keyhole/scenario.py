@@ -390,8 +390,8 @@ def _check_clearance(scenario: KeyholeScenario) -> None:
     if away >= FAR:
         raise ScenarioError(
             f"organ_motion.breathing={scenario.organ_motion.breathing} m: wall and "
-            f"organ tilt the tube by {math.degrees(angle):.1f} deg over a breath, which "
-            "the snake cannot make up for; expected smaller motions, or more in phase"
+            f"organ tilt the tube by {math.degrees(angle):.1f} deg over a breath, "
+            "which the snake cannot make up for; expected less, or more in phase"
         )
     if away > o.clearance:
         raise ScenarioError(
