@@ -1,15 +1,15 @@
 """Figure 2's "passive wrist emulation control", for every diagram that has an arm."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.bedside.bedside import Bedside
-from diagrams.common.scenario import ScenarioError
 from plants.abdomen.wall_motion import WallMotionParams
 from plants.instruments.tip_push import TipPushParams
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part
 from systems.common.signals import (
     Fulcrum,
     MovingPoint,
@@ -20,10 +20,19 @@ from systems.common.signals import (
 )
 from systems.passive_wrist.fulcrum_estimator import Covariance, FulcrumEstimator
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.navigation_monitor import (
+    Accuracy,
+    NavigationMonitor,
+    NavigationMonitorParams,
+)
 from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
 from systems.passive_wrist.tip_load import TipForce, TipLoad, TipLoadParams
 from systems.passive_wrist.wrist_law import MODES, WristParams
-from systems.sensing.tool_wrench import ToolWrenchParams, add_tool_wrench
+from systems.sensing.tool_wrench import (
+    ToolWrenchParams,
+    add_tool_wrench,
+    told_instrument,
+)
 from systems.sensing.wrench_watch import WrenchWatch, WrenchWatchParams
 
 WRIST_WIRES = (
@@ -37,8 +46,12 @@ WRIST_WIRES = (
     ("wall_force.fulcrum", "passive_wrist.true_fulcrum"),
     ("passive_wrist.tool", "joint_commands.tool"),
     ("passive_wrist.permission", "joint_commands.permission"),
+    ("tool_wrench.shaft", "navigation_monitor.shaft"),
+    ("wrench_watch.believed", "navigation_monitor.wrench"),
+    ("fulcrum_estimator.estimate", "navigation_monitor.estimate"),
+    ("passive_wrist.permission", "navigation_monitor.permission"),
 )
-"""Sensor, estimator and emulation; the task's tool goes to `tool_wanted`."""
+"""Sensor, estimator, emulation and monitor; the task's tool goes to `tool_wanted`."""
 
 TIP_WIRES = (
     ("tool_wrench.shaft", "tip_load.shaft"),
@@ -72,6 +85,7 @@ WRIST_EXPORTS = {
     "wrist.covariance": "fulcrum_estimator.covariance",
     "wrist.pivot": "passive_wrist.pivot",
     "wrist.permission": "passive_wrist.permission",
+    "wrist.accuracy": "navigation_monitor.accuracy",
     "wrist.wrench": "tool_wrench.wrench",
     "wrist.shaft": "tool_wrench.shaft",
     "wall.fulcrum": "wall_force.fulcrum",
@@ -83,6 +97,7 @@ WRIST_SIGNALS = {
     "wrist.covariance": Covariance,
     "wrist.pivot": Point,
     "wrist.permission": Permission,
+    "wrist.accuracy": Accuracy,
     "wrist.wrench": Wrench,
     "wrist.shaft": ShaftMotion,
     "wall.fulcrum": MovingPoint,
@@ -121,18 +136,26 @@ class WristSettings:
     wrench_watch: WrenchWatchParams = part(WrenchWatchParams)
     fulcrum_estimator: FulcrumParams = part(FulcrumParams)
     passive_wrist: WristParams = part(WristParams)
+    navigation_monitor: NavigationMonitorParams = part(NavigationMonitorParams)
+
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        yield from share_instants(self, WRIST_BLOCKS)
 
 
-def check_wrist(scenario: Any) -> None:
-    """Raises ScenarioError for wrist settings that do not go together."""
+WRIST_BLOCKS = (
+    *("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"),
+    "navigation_monitor",
+)
+"""They share the joints' instants."""
+
+
+def share_instants(scenario: Any, names: Iterable[str]) -> Rules:
+    """Blocks that share the joints' instants have their period."""
     period = scenario.joints.period
-    for name in ("tool_wrench", "wrench_watch", "fulcrum_estimator", "passive_wrist"):
-        own = getattr(scenario, name).period
-        if abs(own - period) > 1e-9:
-            raise ScenarioError(
-                f"{name}.period={own} s: expected joints.period={period} s; sensor, "
-                "estimator, wrist and joints share their instants"
-            )
+    for name in names:
+        shared = abs(getattr(scenario, name).period - period) <= 1e-9
+        yield shared, f"{name}.period", f"joints.period={period} s, shared by both"
 
 
 def add_wrist(
@@ -167,7 +190,7 @@ def add_wrist(
             builder,
             bedside.systems["plant"],
             sensor,
-            scenario.instrument,
+            told_instrument(sensor, scenario.instrument),
             bedside.abdomen,
             bedside.below,
             scenario.wall_motion.stiffness_factor,
@@ -175,6 +198,7 @@ def add_wrist(
         "wrench_watch": WrenchWatch(scenario.wrench_watch, guess),
         "fulcrum_estimator": FulcrumEstimator(estimator),
         "passive_wrist": PassiveWristEmulation(wrist),
+        "navigation_monitor": NavigationMonitor(scenario.navigation_monitor),
     }
     systems["wrist_sensor"] = builder.GetSubsystemByName("wrist_sensor")
     if push := bedside.systems.get("tip_push"):
@@ -182,7 +206,7 @@ def add_wrist(
             push.get_output_port(),
             systems["wrist_sensor"].GetInputPort("applied_spatial_force"),
         )
-    new = ["wrench_watch", "fulcrum_estimator", "passive_wrist"]
+    new = [name for name in WRIST_BLOCKS if name != "tool_wrench"]
     tip = getattr(scenario, "tip_load", TipLoadParams())
     if tip.active:
         told = replace(tip, length=scenario.instrument.length, period=sensor.period)

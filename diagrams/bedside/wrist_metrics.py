@@ -76,6 +76,8 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
         "jumps_followed": int(run.wrist.fulcrum.jumps[-1]),
         "estimates_refused": int(run.wrist.fulcrum.refused[-1]),
         "time_frozen": float(np.mean((code == 8) | (code == 9)) * time[-1]),
+        "time_inaccurate": float(np.mean(run.wrist.accuracy.accurate < 0.5) * time[-1]),
+        "accuracy_alarms": int(run.wrist.accuracy.alarms[-1]),
         "mean_speed_scale": float(scale[late].mean()) if late.any() else None,
     }
     if "wrist.tip_force" in run.logged:

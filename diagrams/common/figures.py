@@ -77,6 +77,8 @@ FIGURES = {
     "jumps_followed": Figure("", "of the wall"),
     "estimates_refused": Figure("", "estimates that were not believed"),
     "time_frozen": Figure("s", "with the estimate held"),
+    "time_inaccurate": Figure("s", "in which navigation was not said to be accurate"),
+    "accuracy_alarms": Figure("", "times that it was found not to be"),
     "mean_speed_scale": Figure("%", "of the speed that the wrist allowed"),
     "time_to_2N": Figure("s", "until the force is down to 2 N"),
     "time_to_02N": Figure("s", "until it is down to 0.2 N"),

@@ -44,7 +44,6 @@ class Study:
         make_diagram: Makes the diagram of a case. Exported vector ports named
             `model.signal` can be logged; an exported port `scene_graph.query`
             is shown in Meshcat.
-        check: Raises ScenarioError for a scenario that cannot run.
         measure: The figures of a finished run, flat and in SI units.
         signals: Exported ports to log for a scenario, and their signals.
         log_period: Period of the log [s], on the control clock.
@@ -75,7 +74,6 @@ class Study:
     name: str
     scenario: type[Scenario]
     make_diagram: Callable[[Any], Any]
-    check: Callable[[Any], None]
     measure: Callable[[Any], dict[str, Any]]
     signals: Callable[[Any], dict[str, Any]]
     log_period: float

@@ -14,6 +14,7 @@ PLACES = {
     "estimate": "*_estimator.estimate",
     "tension": "*.tension",
     "arm": "joint_commands.set_point",
+    "fulcrum": "fulcrum_estimator.estimate",
 }
 """Where a kind of fault is, by its first word: at which outputs."""
 

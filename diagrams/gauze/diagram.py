@@ -36,6 +36,7 @@ from systems.motion.tool_navigation import ToolNavigation
 from systems.sensing.optical_tracker import OpticalTracker
 from systems.sensing.registration import Registration
 from systems.sensing.robot_location import RobotLocation
+from systems.sensing.tool_wrench import told_instrument
 from systems.sensing.trajectory_estimator import TrajectoryEstimator
 
 WIRES = (
@@ -252,7 +253,9 @@ def make_blocks(
         "tool_navigation": ToolNavigation(
             s.navigation, s.robot.p_WP, s.robot.p_WG, obstacles
         ),
-        "joint_commands": JointCommands(s.joints, posture, s.arm, s.instrument),
+        "joint_commands": JointCommands(
+            s.joints, posture, s.arm, told_instrument(s.tool_wrench, s.instrument)
+        ),
     }
     for name, tool in tools.items():
         blocks[f"{name}_tool"] = make_tool(tool, s)

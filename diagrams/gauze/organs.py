@@ -64,6 +64,7 @@ PRESS_WIRES = [
     ("tissue_force.touch", "wall_wrench.touch"),
     ("wall_wrench.wall", "fulcrum_estimator.wrench"),
     ("wall_wrench.wall", "passive_wrist.wrench"),
+    ("wall_wrench.wall", "navigation_monitor.wrench"),
     ("clearance_constraint.v_safe", "tissue_press.v_safe"),
     ("clearance_constraint.status", "tissue_press.clearance"),
     ("go_to_target.guide", "tissue_press.guide"),

@@ -1,12 +1,13 @@
 """The scenario of a gauze delivery: every block's and part's parameters."""
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 import math
 from typing import Any
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import TipSettings, WristSettings, check_wrist
-from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.bedside.wrist import TipSettings, WristSettings
+from diagrams.common.scenario import Scenario
 from diagrams.gauze.tools import (
     CAMERA,
     OBSTACLE,
@@ -18,7 +19,7 @@ from diagrams.gauze.tools import (
 )
 from plants.abdomen.abdomen import AbdomenParams
 from plants.arm.arm import ArmParams
-from plants.instruments.instrument import InstrumentParams
+from plants.instruments.instrument import DRY_GAUZE, InstrumentParams
 from plants.organs.organ_touch import OrganTouchParams
 from plants.organs.organs import Organ, surface_of
 from plants.surgeon.hunting_tool import Hunt
@@ -33,7 +34,7 @@ from systems.bypass.obstacle_tools import Margins
 from systems.bypass.tool_bypass import ToolBypassParams
 from systems.bypass.workspace import WorkspaceParams
 from systems.common.geometry import sub, unit
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part, value_of
 from systems.common.signal import vector
 from systems.common.signals import ViewCone
 from systems.motion.camera_planner import CameraPlannerParams
@@ -96,7 +97,8 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     navigation: ToolNavigationParams = part(ToolNavigationParams)
     joints: JointCommandsParams = part(JointCommandsParams)
     arm: ArmParams = part(ArmParams)
-    instrument: InstrumentParams = part(InstrumentParams)
+    # It carries the gauze from the start to S, and to the end of the run.
+    instrument: InstrumentParams = part(lambda: InstrumentParams(gauze_mass=DRY_GAUZE))
     abdomen: AbdomenParams = part(AbdomenParams)
 
     def of_role(self, role: str) -> list[Any]:
@@ -124,6 +126,13 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     def emulated(self) -> bool:
         """Whether the passive wrist is in the diagram: its fulcrum is not given."""
         return self.wrist != "known" or not self.wall_motion.still
+
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        yield from tool_rules(self)
+        yield from super().rules()
+        yield from organ_rules(self)
+        yield from reach_rules(self)
 
 
 LEAST_FULCRUM_DISTANCE = 0.02
@@ -171,111 +180,58 @@ def withdrawn(tool: HandTool) -> HandTool:
     )
 
 
-def check(scenario: GauzeScenario) -> None:
-    """Raises ScenarioError for a scenario that cannot run."""
-    check_tools(scenario)
-    check_wrist(scenario)
-    check_organs(scenario)
-    check_fulcrums(scenario)
-    _check_reach(scenario)
-
-
-def check_organs(scenario: GauzeScenario) -> None:
-    """Raises an error for organs that cannot be, or for a press that has none."""
+def organ_rules(scenario: GauzeScenario) -> Rules:
+    """Organs' surfaces can be read, and a press has an organ and the wrist's sensor."""
     for organ in scenario.organs:
         if organ.file:
             surface_of(organ)
-    if not scenario.press.active:
-        return
-    if not scenario.organs:
-        raise ScenarioError("press.active=True: expected organs to press on")
-    if not scenario.emulated:
-        raise ScenarioError(
-            f"wrist={scenario.wrist!r}: expected 'pwe' with press.active, whose force "
-            "loop needs the wrist's sensor"
-        )
-    if scenario.tip_load.active:
-        raise ScenarioError(
-            "tip_load.active=True: expected False with press.active, which tells what "
-            "touches the tip itself"
-        )
+    press = scenario.press.active
+    yield not press or bool(scenario.organs), "organs", "one to press on: press.active"
+    sensed = not press or scenario.emulated
+    yield sensed, "wrist", "'pwe' with press.active, whose force loop needs its sensor"
+    alone = not (press and scenario.tip_load.active)
+    told = "False with press.active, which tells what touches the tip itself"
+    yield alone, "tip_load.active", told
 
 
-def check_tools(scenario: GauzeScenario) -> None:
-    """Raises ScenarioError for tools that cannot be."""
+def tool_rules(scenario: GauzeScenario) -> Rules:
+    """Tools have names of their own, one is the target and one the camera."""
     names = [one.name for one in (*scenario.tools, *scenario.organs)]
-    for name in names:
-        if names.count(name) > 1 or not name.isidentifier():
-            raise ScenarioError(
-                f"tools and organs {names}: expected names that differ, of letters, "
-                "digits and _"
-            )
+    differ = len(set(names)) == len(names) and all(map(str.isidentifier, names))
+    told = f"names that differ, of letters, digits and _, not {names}"
+    yield differ, "tools", told
     for role in (TARGET, CAMERA):
-        if len(scenario.of_role(role)) != 1:
-            called = [tool.name for tool in scenario.of_role(role)]
-            raise ScenarioError(f"tools of role {role!r}={called}: expected one")
-    if not scenario.obstacles:
-        raise ScenarioError(
-            f"tools={names}: expected at least one of role {OBSTACLE!r}; a tool that "
-            "stays in its trocar is out of the way"
-        )
+        called = [tool.name for tool in scenario.of_role(role)]
+        yield len(called) == 1, "tools", f"one of role {role!r}, not {called}"
+    told = f"one of role {OBSTACLE!r}; one that stays in its trocar is out of the way"
+    yield bool(scenario.obstacles), "tools", told
     for tool in scenario.of_role(TARGET) + scenario.obstacles:
-        if tool.hunt.speed and tool.recording:
-            raise ScenarioError(
-                f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with a "
-                "recording"
-            )
-        if tool.hunt.speed and (tool.breathes or tool.hand.seed):
-            raise ScenarioError(
-                f"{tool.name}.hunt.speed={tool.hunt.speed}: expected 0 together with "
-                "breathing or a synthetic hand"
-            )
         if tool.recording:
             second = float(load_recording(tool.recording)[0][1])
-            if scenario.duration <= second:
-                raise ScenarioError(
-                    f"duration={scenario.duration} s: expected > {second:.4g} s, the "
-                    f"second sample of {tool.name}.recording; are its times in s?"
-                )
-
-
-def check_fulcrums(scenario: GauzeScenario) -> None:
-    """Raises ScenarioError for trocars that are too close to each other."""
+            told = f"> {second:.4g} s, the second sample of {tool.name}.recording"
+            yield scenario.duration > second, "duration", f"{told}; are its times in s?"
     fulcrums = {"robot": scenario.robot.p_WG}
     fulcrums |= {tool.name: tool.p_WG for tool in scenario.tools}
-    names = list(fulcrums)
-    for index, one in enumerate(names):
-        for other in names[index + 1 :]:
-            gap = math.dist(fulcrums[one], fulcrums[other])
-            if gap < LEAST_FULCRUM_DISTANCE:
-                raise ScenarioError(
-                    f"fulcrums {one}.p_WG={fulcrums[one]} and {other}.p_WG="
-                    f"{fulcrums[other]} are {gap:.4f} m apart: expected at least "
-                    f"{LEAST_FULCRUM_DISTANCE} m"
-                )
+    for one, other in combinations(fulcrums, 2):
+        gap = math.dist(fulcrums[one], fulcrums[other])
+        told = f"trocars >= {LEAST_FULCRUM_DISTANCE} m apart"
+        pair = f"{one}.p_WG and {other}.p_WG are {gap:.4f}"
+        yield gap >= LEAST_FULCRUM_DISTANCE, "tools", f"{told}, {pair}"
 
 
-def _check_reach(scenario: GauzeScenario) -> None:
-    """The start and S's first tip must be reachable and in view."""
-    limits = scenario.navigation
+def reach_rules(scenario: GauzeScenario) -> Rules:
+    """The start and S's first tip are within reach, and the latter in view."""
+    limits, camera = scenario.navigation, scenario.camera
     record = constants(limits)[0]
-    p_WG, apex = vector(scenario.robot.p_WG), vector(scenario.camera.p_WG)
-    for name, point in (
-        ("robot.p_WP", scenario.robot.p_WP),
-        ("target.points[0]", scenario.target.points[0]),
-    ):
-        if not reachable(record, p_WG, vector(point)):
-            raise ScenarioError(
-                f"{name}={point} is out of reach through robot.p_WG="
-                f"{scenario.robot.p_WG}: expected an insertion in "
-                f"[{limits.min_insertion}, {limits.max_insertion}] m and a tilt of at "
-                f"most {limits.max_tilt} rad"
-            )
-    start = scenario.target.points[0]
-    axis = unit(sub(vector(scenario.camera.p_WS), apex))
-    cone = ViewCone(apex, axis, scenario.camera.half_angle)
-    if cone_angle(cone, vector(start)) > cone.half:
-        raise ScenarioError(
-            f"target.points[0]={start} lies outside the view cone of half angle "
-            f"{scenario.camera.half_angle} rad about camera.p_WS={scenario.camera.p_WS}"
-        )
+    p_WG, apex = vector(scenario.robot.p_WG), vector(camera.p_WG)
+    told = (
+        f"within reach through robot.p_WG={scenario.robot.p_WG}, an insertion in "
+        f"[{limits.min_insertion}, {limits.max_insertion}] m and a tilt of at most "
+        f"{limits.max_tilt} rad"
+    )
+    for key in ("robot.p_WP", "target.points[0]"):
+        yield reachable(record, p_WG, vector(value_of(scenario, key))), key, told
+    cone = ViewCone(apex, unit(sub(vector(camera.p_WS), apex)), camera.half_angle)
+    seen = cone_angle(cone, vector(scenario.target.points[0])) <= cone.half
+    told = f"in the camera's view, {cone.half:.3g} rad about camera.p_WS={camera.p_WS}"
+    yield seen, "target.points[0]", told

@@ -14,7 +14,7 @@ from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.organs import organ_signals
 from diagrams.gauze.plots import plots
-from diagrams.gauze.scenario import GauzeScenario, check, companions
+from diagrams.gauze.scenario import GauzeScenario, companions
 from diagrams.gauze.tools import OBSTACLE, gather, hands, in_the_way, logged
 from plants.abdomen.wall_force import FulcrumError
 from plants.arm.signals import Posture
@@ -111,7 +111,6 @@ STUDY = Study(
     scenario=GauzeScenario,
     make_diagram=lambda case: make_gauze_diagram(case.scenario),
     gather=gather,
-    check=check,
     measure=measure,
     signals=signals,
     log_period=1.0 / 30.0,

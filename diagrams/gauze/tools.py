@@ -12,7 +12,7 @@ import numpy as np
 from diagrams.common.scenario import ScenarioError
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.surgeon_tool import SurgeonToolParams
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part
 from systems.motion.endoscope import EndoscopeParams
 
 TARGET, OBSTACLE, CAMERA = ROLES = ("target", "obstacle", "camera")
@@ -29,6 +29,13 @@ class HandTool(SurgeonToolParams):
     name: str = parameter("", "by which keys, log and figures go")
     role: str = parameter(OBSTACLE, "what it is to the robot", choices=ROLES[:2])
     hunt: Hunt = part(Hunt)
+
+    def rules(self) -> Rules:
+        """What hunts does nothing else."""
+        yield from super().rules()
+        alone = not (self.recording or self.breathes or self.hand.seed)
+        told = "0 together with a recording, breathing or a synthetic hand"
+        yield alone or not self.hunt.speed, "hunt.speed", told
 
 
 @dataclass

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from diagrams.bedside.bedside import ToolAtStart
-from diagrams.bedside.wrist import WristSettings
+from diagrams.bedside.wrist import WRIST_BLOCKS, WristSettings, share_instants
 from diagrams.common.scenario import Scenario, ScenarioError
-from diagrams.gauze.scenario import GauzeScenario, check_fulcrums, check_tools
+from diagrams.gauze.scenario import GauzeScenario, tool_rules
 from diagrams.gauze.tools import CameraTool
 from diagrams.resection.scenario import ResectionScenario
-from diagrams.resection.scenario import check as check_resection
 from plants.abdomen.abdomen import AbdomenParams
 from plants.abdomen.organ_motion import OrganMotionParams
 from plants.arm.arm import ArmParams
@@ -25,13 +24,14 @@ from plants.surgeon.recording import load_recording
 from plants.tissue.volume import Access
 from systems.bypass.obstacle_tools import Margins
 from systems.common.geometry import pose_of
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
 from systems.keyhole.snake_task import FAR, SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
+from systems.passive_wrist.navigation_monitor import NavigationMonitorParams
 from systems.passive_wrist.sensor_zero import SensorZeroParams
 from systems.passive_wrist.wrist_law import WristParams
 from systems.resection.wires.resection_ik import ResectionIkParams
@@ -47,8 +47,8 @@ PERIOD = 1.0 / 60.0
 """Of all blocks, the tracker's."""
 CLOCKED = (
     *("joints", "operation", "organ_estimator", "phases", "tube_task", "snake_task"),
-    *("tool_wrench", "sensor_zero", "wrench_watch", "fulcrum_estimator"),
-    "passive_wrist",
+    "sensor_zero",
+    *WRIST_BLOCKS,
 )
 """Blocks that share their instants."""
 BASE = 2e-3
@@ -169,6 +169,10 @@ class Theatre(GauzeScenario):
 
     margins: WideMargins = part(WideMargins)
 
+    def rules(self) -> Rules:
+        """Those of its tools count only where they are there, see `others`."""
+        yield from ()
+
 
 @dataclass
 class Entry:
@@ -205,6 +209,7 @@ class KeyholeScenario(Scenario, WristSettings):
     tool_wrench: ToolWrenchParams = clocked(ToolWrenchParams)
     sensor_zero: SensorZeroParams = clocked(SensorZeroParams)
     wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
+    navigation_monitor: NavigationMonitorParams = clocked(NavigationMonitorParams)
     # Half of an instrument's: the snake's couplers feel what the tube's end does.
     passive_wrist: WristParams = clocked(
         WristParams, wrist_acceleration=2.5, slides=True
@@ -217,6 +222,23 @@ class KeyholeScenario(Scenario, WristSettings):
     # Taken as 100 g: CENIC takes the bushing's damper explicitly, and h D / m must stay
     # below 2; with 20 g arm and trocar shake themselves up.
     abdomen: AbdomenParams = part(lambda: AbdomenParams(sleeve_mass=0.1))
+
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        gap = self.instrument.gap
+        far = self.tube_task.standoff >= gap
+        yield far, "tube_task.standoff", f">= instrument.gap={gap} m"
+        yield from share_instants(self, CLOCKED)
+        yield from reach_rules(self)
+        if self.task == "resect":
+            yield from clearance_rules(self)
+        if self.task == "circle":
+            circle_postures(self)
+        if self.others:
+            for holds, key, expected in tool_rules(self.surgeon):
+                yield holds, f"theatre.{key}", expected
+        if self.organ_motion.recording:
+            load_recording(self.organ_motion.recording)
 
     @property
     def axis(self) -> np.ndarray:
@@ -291,74 +313,35 @@ def circle_postures(scenario: KeyholeScenario) -> tuple[np.ndarray, np.ndarray]:
     return np.array([one.x for one in solved]), times
 
 
-def check(scenario: KeyholeScenario) -> None:
-    """Raises ScenarioError for a scenario that cannot run."""
-    check_resection(scenario.operation)
-    period = scenario.joints.period
-    for name in CLOCKED:
-        own = getattr(scenario, name).period
-        if abs(own - period) > 1e-9:
-            raise ScenarioError(
-                f"{name}.period={own} s: expected joints.period={period} s; arm, wrist "
-                "and snake share their instants"
-            )
-    _check_reach(scenario)
-    if scenario.task == "resect":
-        _check_clearance(scenario)
-    if scenario.task == "circle":
-        circle_postures(scenario)
-    if scenario.others:
-        check_tools(scenario.surgeon)
-        check_fulcrums(scenario.surgeon)
-    if scenario.organ_motion.recording:
-        load_recording(scenario.organ_motion.recording)
-
-
-def _check_reach(scenario: KeyholeScenario) -> None:
-    """Tube and trocar must reach the station, at rest and over a breath."""
-    limits, length = ReachLimits(), scenario.instrument.length
-    p_WG, p_WE = np.array(scenario.robot.p_WG), np.array(scenario.entry.p_WE)
-    standoff, gap = scenario.tube_task.standoff, scenario.instrument.gap
-    if standoff < gap:
-        raise ScenarioError(
-            f"tube_task.standoff={standoff} m: expected >= instrument.gap={gap}, or "
-            "the tube would stand nearer than it works"
-        )
-    down = np.subtract(scenario.robot.p_WP, p_WG)
+def reach_rules(scenario: KeyholeScenario) -> Rules:
+    """The tube begins in its trocar; the two reach the station over a breath."""
+    limits, tube = ReachLimits(), scenario.instrument
+    down = np.subtract(scenario.robot.p_WP, scenario.robot.p_WG)
     inside = float(np.linalg.norm(down))
-    if not (
-        limits.min_insertion <= inside <= limits.max_insertion
-        and -down[2] >= inside * math.cos(limits.max_tilt)
-    ):
-        raise ScenarioError(
-            f"robot.p_WP={scenario.robot.p_WP}: the tube's end must begin "
-            f"{limits.min_insertion} to {limits.max_insertion} m inside the trocar at "
-            f"{scenario.robot.p_WG}, at most {math.degrees(limits.max_tilt):.0f} deg "
-            "off its vertical"
-        )
-    depth = float(np.linalg.norm(p_WE - p_WG))
+    told = (
+        f"{limits.min_insertion} to {limits.max_insertion} m inside the trocar at "
+        f"{scenario.robot.p_WG}, {math.degrees(limits.max_tilt):.0f} deg at most off "
+        "its vertical"
+    )
+    upright = -down[2] >= inside * math.cos(limits.max_tilt)
+    begins = limits.min_insertion <= inside <= limits.max_insertion and upright
+    yield begins, "robot.p_WP", told
+    depth = math.dist(scenario.entry.p_WE, scenario.robot.p_WG)
     tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
-    least = depth - scenario.tube_task.standoff
-    most = depth - scenario.instrument.gap
-    if tilt > limits.max_tilt:
-        raise ScenarioError(
-            f"entry.p_WE={scenario.entry.p_WE}: it lies {math.degrees(tilt):.0f} deg "
-            f"off the vertical of the trocar, expected at most "
-            f"{math.degrees(limits.max_tilt):.0f}; {better_trocars(scenario)}"
-        )
-    if not (limits.min_insertion <= least and most <= limits.max_insertion):
-        low = limits.min_insertion + scenario.tube_task.standoff
-        high = limits.max_insertion + scenario.instrument.gap
-        raise ScenarioError(
-            f"entry.p_WE={scenario.entry.p_WE}: it lies {depth:.3f} m from the trocar, "
-            f"expected {low:.3f} to {high:.3f}; {better_trocars(scenario)}"
-        )
-    if length - scenario.instrument.mount_length < most + 0.02:
-        raise ScenarioError(
-            f"instrument.length={length} m: the tube is too short, the mount would "
-            f"meet the trocar; expected >= "
-            f"{most + 0.02 + scenario.instrument.mount_length:.3f}"
-        )
+    low = limits.min_insertion + scenario.tube_task.standoff
+    high = limits.max_insertion + tube.gap
+    told = (
+        f"it within {math.degrees(limits.max_tilt):.0f} deg of the trocar's vertical, "
+        f"not {math.degrees(tilt):.0f}; "
+    )
+    near = tilt <= limits.max_tilt
+    yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
+    near = low <= depth <= high
+    told = f"it {low:.3f} to {high:.3f} m from the trocar, not {depth:.3f}; "
+    yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
+    least = depth - tube.gap + 0.02 + tube.mount_length
+    told = f">= {least:.3f}: the tube is too short, its mount would meet the trocar"
+    yield tube.length >= least, "instrument.length", told
 
 
 def tube_tilt(scenario: KeyholeScenario) -> float:
@@ -373,33 +356,24 @@ def tube_tilt(scenario: KeyholeScenario) -> float:
     return most
 
 
-def _check_clearance(scenario: KeyholeScenario) -> None:
-    """The plan must have room for what the tube's tilt does to the snake's body."""
+def clearance_rules(scenario: KeyholeScenario) -> Rules:
+    """The plan has room for what the tube's tilt does to the snake's body."""
     o, angle, gap = scenario.operation, tube_tilt(scenario), scenario.instrument.gap
-    if scenario.phases.deviation > o.clearance:
-        raise ScenarioError(
-            f"phases.deviation={scenario.phases.deviation} m: expected <= "
-            f"operation.clearance={o.clearance} m, the room that the plan has"
-        )
+    room = f"<= operation.clearance={o.clearance} m, the room that the plan has"
+    yield scenario.phases.deviation <= o.clearance, "phases.deviation", room
     c, s = math.cos(angle), math.sin(angle)
     E = pose_of((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     C = pose_of((gap * s, 0.0, gap * (c - 1.0)), (c, 0.0, -s), (s, 0.0, c))
-    snake = o.snake
-    geometry = snake.half_pitch, snake.tool_offset, snake.max_bend
+    geometry = o.snake.half_pitch, o.snake.tool_offset, o.snake.max_bend
     away = body_deviation(np.array(BENT), C, E, *geometry)
-    if away >= FAR:
-        raise ScenarioError(
-            f"organ_motion.breathing={scenario.organ_motion.breathing} m: wall and "
-            f"organ tilt the tube by {math.degrees(angle):.1f} deg over a breath, "
-            "which the snake cannot make up for; expected less, or more in phase"
-        )
-    if away > o.clearance:
-        raise ScenarioError(
-            f"operation.clearance={o.clearance} m: wall and organ tilt the tube by "
-            f"{math.degrees(angle):.1f} deg over a breath, which bends the snake's "
-            f"body off its plan by {away:.2g} m; expected at least that, or motions "
-            "more in phase"
-        )
+    tilted = f"wall and organ tilt the tube by {math.degrees(angle):.1f} deg"
+    told = f"less, or more in phase: {tilted}, which the snake cannot make up for"
+    yield away < FAR, "organ_motion.breathing", told
+    told = (
+        f">= {away:.2g} m, by which the body leaves its plan when {tilted}; or motions "
+        "more in phase"
+    )
+    yield away <= o.clearance, "operation.clearance", told
 
 
 def better_trocars(scenario: KeyholeScenario) -> str:

@@ -13,7 +13,7 @@ from diagrams.keyhole.metrics import measure
 from diagrams.keyhole.operation import LOG_PERIOD, length, outline, prepare
 from diagrams.keyhole.plots import plots
 from diagrams.keyhole.replay import decorate
-from diagrams.keyhole.scenario import KeyholeScenario, check
+from diagrams.keyhole.scenario import KeyholeScenario
 from plants.abdomen.wall_force import FulcrumError
 from plants.instruments.clearance import Gap, column
 from plants.snake.signals import ToolPose
@@ -89,7 +89,6 @@ STUDY = Study(
     name="keyhole",
     scenario=KeyholeScenario,
     make_diagram=make_keyhole_diagram,
-    check=check,
     measure=measure,
     signals=signals,
     log_period=LOG_PERIOD,

@@ -16,7 +16,7 @@ from plants.crowd.walls import WallParams, segments, wall_distance
 from plants.turtlebot.lidar import LidarParams
 from plants.turtlebot.odometry import OdometryParams
 from plants.turtlebot.turtlebot import TurtlebotParams
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part
 from systems.perception.grid_mapping import GridMappingParams
 from systems.perception.signals import CELLS
 from systems.perception.tracking import TrackingParams
@@ -83,6 +83,17 @@ class NavigationScenario(Scenario):
     classical: ClassicalParams = part(ClassicalParams)
     control: UnicycleControlParams = part(UnicycleControlParams)
 
+    def rules(self) -> Rules:
+        """What must hold across fields."""
+        given = [bool(self.crowd.people), bool(self.obstacles), bool(self.recording)]
+        one = "none together with others: obstacles, crowd.people or a recording"
+        yield sum(given) <= 1, "obstacles", one
+        way = dist(self.start, self.goal)
+        told = f"it more than reach={self.reach} m from the start, not {way:.3g}"
+        yield way > self.reach, "goal", told
+        yield from wall_rules(self)
+        yield from room_rules(self)
+
 
 def heading(scenario: NavigationScenario) -> float:
     """The robot's heading at the start: towards the goal [rad]."""
@@ -130,82 +141,54 @@ def companions(scenario: NavigationScenario) -> dict[str, NavigationScenario]:
     }
 
 
-def check(scenario: NavigationScenario) -> None:
-    """Raises ScenarioError for a scenario that cannot run."""
-    given = [bool(scenario.crowd.people), bool(scenario.obstacles)]
-    if sum([*given, bool(scenario.recording)]) > 1:
-        raise ScenarioError(
-            "obstacles, crowd.people and recording: expected one of them"
-        )
-    way = dist(scenario.start, scenario.goal)
-    if way <= scenario.reach:
-        raise ScenarioError(
-            f"goal={scenario.goal}: {way:.3g} m from start={scenario.start}, expected "
-            f"more than reach={scenario.reach} m"
-        )
-    _check_walls(scenario)
-    _check_room(scenario)
-
-
-def _check_walls(scenario: NavigationScenario) -> None:
+def wall_rules(scenario: NavigationScenario) -> Rules:
     """Walls are seen by lidar, start and goal are clear of them, and on the grid."""
-    if scenario.senses == "given":
-        if scenario.walls:
-            raise ScenarioError("walls: expected senses=lidar, which alone sees them")
+    seen = scenario.senses == "lidar"
+    yield seen or not scenario.walls, "walls", "senses=lidar, which alone sees them"
+    if not seen:
         return
     segments(scenario.walls)
     grid, body = mapping_params(scenario), scenario.robot.radius
     half = 0.5 * CELLS * grid.cell
-    ends = {"start": scenario.start, "goal": scenario.goal}
-    for name, place in ends.items():
-        if max(abs(place[0] - grid.x), abs(place[1] - grid.y)) > half:
-            raise ScenarioError(
-                f"{name}={place}: beyond the grid, {2.0 * half:.3g} m wide about "
-                f"[{grid.x:.3g}, {grid.y:.3g}]; expected within it, or a larger "
-                "mapping.cell"
-            )
-    gaps = wall_distance(scenario.walls, np.array(list(ends.values())))
-    for (name, place), gap in zip(ends.items(), gaps, strict=True):
-        if gap < body:
-            raise ScenarioError(
-                f"{name}={place} lies in a wall as the robot sees it: {gap:.3g} m from "
-                f"it, expected at least {body:.3g}"
-            )
+    on_grid = (
+        f"it on the grid, {2.0 * half:.3g} m wide about [{grid.x:.3g}, {grid.y:.3g}], "
+        "or a larger mapping.cell"
+    )
+    for name in ("start", "goal"):
+        x, y = place = getattr(scenario, name)
+        yield max(abs(x - grid.x), abs(y - grid.y)) <= half, name, on_grid
+        (gap,) = wall_distance(scenario.walls, np.array([place]))
+        told = f"it {body:.3g} m from the walls as the robot sees them, not {gap:.3g}"
+        yield gap >= body, name, told
 
 
-def _check_room(scenario: NavigationScenario) -> None:
-    """Start and goal must be clear of obstacles, and obstacles be seen in time."""
-    body = scenario.robot.radius
-    safe = body + scenario.switching.margins[-1]
-    vision = scenario.perception.vision
-    widest = body + scenario.switching.margins[0]
-    if scenario.planner == "switching" and vision <= widest:
-        raise ScenarioError(
-            f"perception.vision={vision} m: expected > {widest:.6g}, robot.radius and "
-            "the first of switching.margins together"
-        )
+def room_rules(scenario: NavigationScenario) -> Rules:
+    """Start and goal are clear of obstacles, and obstacles are seen in time."""
+    body, vision = scenario.robot.radius, scenario.perception.vision
+    margins = scenario.switching.margins
+    widest = body + margins[0]
+    sees = vision > widest or scenario.planner != "switching"
+    told = f"> {widest:.6g}, robot.radius and the first of switching.margins together"
+    yield sees, "perception.vision", told
     for index, (x, y, radius, _, _) in enumerate(discs(scenario)):
-        if radius + body >= vision:
-            raise ScenarioError(
-                f"obstacles[{index}].radius={radius} m with the robot's {body} m "
-                f"exceeds perception.vision={vision} m: it would be hit before it is "
-                f"seen; expected R_i < {vision - body:.3g}"
-            )
-        gap = dist((x, y), scenario.start)
-        if gap < radius + safe:
-            raise ScenarioError(
-                f"start={scenario.start} lies inside the safety circle of "
-                f"obstacles[{index}]: {gap:.3g} m from its centre, expected at least "
-                f"{radius + safe:.3g}"
-            )
+        told = (
+            f"> {radius + body:.3g}, or obstacles[{index}] of radius {radius} m is hit "
+            "before it is seen"
+        )
+        yield radius + body < vision, "perception.vision", told
+        gap, safe = dist((x, y), scenario.start), radius + body + margins[-1]
+        told = (
+            f"it outside the safety circle of obstacles[{index}], {safe:.3g} m from "
+            f"its centre, not {gap:.3g}"
+        )
+        yield gap >= safe, "start", told
         still = not scenario.crowd.people and _stands(walking(scenario)[index])
         gap = dist((x, y), scenario.goal)
-        if still and gap < radius + body:
-            raise ScenarioError(
-                f"goal={scenario.goal} lies inside obstacles[{index}] as the robot "
-                f"sees it: {gap:.3g} m from its centre, expected at least "
-                f"{radius + body:.3g}"
-            )
+        told = (
+            f"it {radius + body:.3g} m from the centre of obstacles[{index}], which "
+            f"stands, not {gap:.3g}"
+        )
+        yield gap >= radius + body or not still, "goal", told
 
 
 def _stands(obstacle: ObstacleParams) -> bool:

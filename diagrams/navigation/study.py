@@ -13,7 +13,7 @@ from diagrams.navigation.diagram import floor, make_navigation_diagram
 from diagrams.navigation.metrics import measure
 from diagrams.navigation.perceived import decorate_perception
 from diagrams.navigation.plots import plots, state_names
-from diagrams.navigation.scenario import NavigationScenario, check, companions
+from diagrams.navigation.scenario import NavigationScenario, companions
 from plants.crowd.signals import OBSTACLES
 from plants.turtlebot.lidar import SCAN
 from plants.turtlebot.turtlebot import Command, RobotState
@@ -87,7 +87,6 @@ STUDY = Study(
     name="navigation",
     scenario=NavigationScenario,
     make_diagram=lambda case: make_navigation_diagram(case.scenario),
-    check=check,
     measure=measure,
     signals=lambda scenario: SIGNALS | (SENSED if scenario.senses == "lidar" else {}),
     log_period=0.05,

@@ -20,7 +20,7 @@ from plants.tissue.mask import load_mask
 from plants.tissue.space import NEIGHBOUR
 from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
 from plants.tissue.volume import Access, make_volume
-from systems.common.archive import beside
+from systems.common.archive import before, beside
 from systems.resection.planning.access import propose_access
 from systems.resection.planning.next_entry import next_entries
 from systems.resection.planning.planner import Planner
@@ -207,12 +207,15 @@ def reach_of(
         saved = load_reach(beside(file, "reach"), session, seed, effort)
         if saved is not None:
             return saved
+    half = beside(file, "search") if file else None
     with progress("what can be reached", "of the tumour") as show:
         reach = find_reach(
-            session, seed, effort, progress=lambda share: show(share, 1.0)
+            session, seed, effort, progress=lambda share: show(share, 1.0), file=half
         )
-    if file is not None:
+    if file and half:
         save_reach(beside(file, "reach"), reach, session, seed, effort)
+        for path in (half, before(half)):
+            path.unlink(missing_ok=True)
     return reach
 
 

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from diagrams.common.scenario import Scenario, ScenarioError
+from diagrams.common.scenario import Scenario
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.tissue import SyntheticTumour
 from plants.tissue.tissue_carver import TissueCarverParams
 from plants.tissue.volume import Access
-from systems.common.parameter import parameter, part
+from systems.common.parameter import Rules, parameter, part
 from systems.resection.planning.next_entry import EntriesParams
 from systems.resection.planning.planner import PlannerParams
 from systems.resection.planning.procedure import Procedure, check_procedure
@@ -92,10 +92,8 @@ class ResectionScenario(Scenario):
     watch: WireWatchParams = part(WireWatchParams)
     carver: TissueCarverParams = part(TissueCarverParams)
 
-
-def check(scenario: ResectionScenario) -> None:
-    """Raises ScenarioError for a scenario that cannot run."""
-    for index, procedure in enumerate(scenario.procedures):
-        check_procedure(procedure, scenario.snake, f"procedures[{index}]")
-    if scenario.mask and not Path(scenario.mask).is_file():
-        raise ScenarioError(f"mask={scenario.mask!r}: no such file")
+    def rules(self) -> Rules:
+        """Procedures are the robot's, and a mask is there."""
+        for index, procedure in enumerate(self.procedures):
+            check_procedure(procedure, self.snake, f"procedures[{index}]")
+        yield not self.mask or Path(self.mask).is_file(), "mask", "a file that is there"

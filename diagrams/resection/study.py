@@ -16,7 +16,7 @@ from diagrams.resection.operation import (
 )
 from diagrams.resection.plots import plots
 from diagrams.resection.replay import decorate
-from diagrams.resection.scenario import ResectionScenario, check
+from diagrams.resection.scenario import ResectionScenario
 from plants.snake.signals import ToolPose
 from plants.tissue.execution import save_execution
 from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
@@ -65,7 +65,6 @@ STUDY = Study(
     name="resection",
     scenario=ResectionScenario,
     make_diagram=make_resection_diagram,
-    check=check,
     measure=measure,
     signals=lambda scenario: SIGNALS,
     log_period=LOG_PERIOD,

@@ -9,7 +9,8 @@ from plants.snake.elastic_wires import ElasticWiresParams
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.parameters import SnakeParams
 from plants.snake.reachability import why_not
-from systems.common.parameter import parameter, part
+from plants.snake.signals import ToolTarget
+from systems.common.parameter import Rules, parameter, part
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import TipReferenceParams, reference
 from systems.resection.wires.tool_load import ToolLoadParams
@@ -55,32 +56,21 @@ class SnakeScenario(Scenario):
     load: ToolLoadParams = part(ToolLoadParams)
     watch: WireWatchParams = part(WireWatchParams)
 
-
-def check(scenario: SnakeScenario) -> None:
-    """Raises ScenarioError for a scenario that cannot run."""
-    if scenario.elastic.breaks and scenario.wires != "elastic":
-        raise ScenarioError(
-            "elastic.breaks: wires of wires='drums' cannot go slack; "
-            "expected wires='elastic'"
-        )
-    if any(scenario.load.force) and scenario.wires != "statics":
-        raise ScenarioError(
-            f"load.force={scenario.load.force} N: wires={scenario.wires!r} know no "
-            "force on the tool; expected wires='statics'"
-        )
-    _check_reach(scenario)
+    def rules(self) -> Rules:
+        """Wires know what is asked of them, and the tool's way is within reach."""
+        slack = not self.elastic.breaks or self.wires == "elastic"
+        yield slack, "elastic.breaks", "none but of wires='elastic', that can go slack"
+        loaded = not any(self.load.force) or self.wires == "statics"
+        yield loaded, "load.force", "zero without wires='statics', that know a force"
+        for name, target in _targets(self.tip):
+            if not tool_postures(*target, self.snake).reached:
+                raise ScenarioError(f"{name}: {why_not(*target, self.snake)}")
 
 
-def _check_reach(scenario: SnakeScenario) -> None:
-    """Every pose, and a whole turn of the circle, must be within reach."""
-    tip = scenario.tip
+def _targets(tip: TipReferenceParams) -> list[tuple[str, ToolTarget]]:
+    """Every pose, or a whole turn of the circle, by its key."""
     if tip.poses:
-        samples = [(f"tip.poses[{i}]", p.target()) for i, p in enumerate(tip.poses)]
-    else:
-        turn = tip.circle.period
-        times = [tip.circle.ramp + turn * k / 72 for k in range(72)]
-        samples = [("tip.circle", reference(tip, t)) for t in times]
-    for name, target in samples:
-        if not tool_postures(*target, scenario.snake).reached:
-            reason = why_not(*target, scenario.snake)
-            raise ScenarioError(f"{name}: {reason}")
+        return [(f"tip.poses[{i}]", p.target()) for i, p in enumerate(tip.poses)]
+    turn = tip.circle.period
+    times = [tip.circle.ramp + turn * k / 72 for k in range(72)]
+    return [("tip.circle", reference(tip, t)) for t in times]

@@ -12,7 +12,7 @@ from diagrams.common.study import Study, View, cenic
 from diagrams.snake.diagram import make_snake_diagram
 from diagrams.snake.metrics import break_time, measure
 from diagrams.snake.plots import plots, turns_in
-from diagrams.snake.scenario import SnakeScenario, check
+from diagrams.snake.scenario import SnakeScenario
 from diagrams.snake.wire_replay import animate_wires
 from plants.snake.signals import Drums, Stability, Tensions, ToolForce, ToolPose
 from systems.resection.wires.ball_location import BallAngles, Gaps
@@ -92,7 +92,6 @@ STUDY = Study(
     name="snake",
     scenario=SnakeScenario,
     make_diagram=lambda case: make_snake_diagram(case.scenario),
-    check=check,
     measure=measure,
     signals=signals,
     log_period=LOG_PERIOD,

@@ -12,6 +12,7 @@ from diagrams.wrist.scenario import WristScenario
 from systems.motion.joint_commands import JointCommands
 from systems.passive_wrist.arc_navigation import ArcNavigation
 from systems.sensing.robot_location import RobotLocation
+from systems.sensing.tool_wrench import told_instrument
 
 WIRES = (
     # The task plans its arcs about the fulcrum that the wrist turns about.
@@ -59,7 +60,7 @@ def make_wrist_diagram(
                 scenario.joints,
                 bedside.posture.tolist(),
                 scenario.arm,
-                scenario.instrument,
+                told_instrument(scenario.tool_wrench, scenario.instrument),
             ),
             "robot_location": RobotLocation(scenario.instrument),
         },

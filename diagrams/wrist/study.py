@@ -3,7 +3,7 @@
 from typing import Any
 
 from diagrams.bedside.bedside import stiffen
-from diagrams.bedside.wrist import check_wrist, wrist_signals
+from diagrams.bedside.wrist import wrist_signals
 from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
@@ -31,7 +31,6 @@ STUDY = Study(
     name="wrist",
     scenario=WristScenario,
     make_diagram=lambda case: make_wrist_diagram(case.scenario),
-    check=check_wrist,
     measure=measure,
     signals=lambda scenario: SIGNALS | wrist_signals(scenario),
     log_period=1.0 / 120.0,

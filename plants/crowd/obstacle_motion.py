@@ -61,21 +61,14 @@ class ObstacleParams:
         if self.motion == "waypoints":
             count = len(self.points)
             rising = all(a < b for a, b in pairwise(self.times))
-            yield (
-                0 < len(self.times) == count and rising,
-                "times",
-                f"as many rising times as points, {count}",
-            )
+            paired = 0 < len(self.times) == count and rising
+            yield paired, "times", f"as many rising times as points, {count}"
         if self.motion == "bouncing":
-            least_x, least_y, most_x, most_y = self.box
-            walls = ((least_x, most_x), (least_y, most_y))
-            for axis, x, (low, high) in zip("xy", self.start, walls, strict=True):
-                low, high = low + self.radius, high - self.radius
-                yield (
-                    low <= x <= high and low < high,
-                    "start",
-                    f"its {axis} in the box, a radius from the walls: [{low}, {high}]",
-                )
+            r = self.radius
+            for axis, x in enumerate(self.start):
+                low, high = self.box[axis] + r, self.box[axis + 2] - r
+                told = f"its {'xy'[axis]} in the box, a radius from the walls: "
+                yield low <= x <= high and low < high, "start", f"{told}[{low}, {high}]"
 
 
 def _bounce(x: float, v: float, low: float, high: float) -> tuple[float, float]:

@@ -7,9 +7,11 @@ from systems.common.parameter import parameter
 KINDS = (
     *("force_stuck", "force_flipped", "force_bias", "force_silent"),
     *("frame_future", "estimate_nan", "tension_nan", "arm_slow"),
+    *("fulcrum_aside", "fulcrum_deep"),
 )
 """What can fail. Sizes: N along x in W of `force_bias` (of one sample: a spike), s that
-a frame is stamped too late, rad/s of the slow arm's joints; the others have none."""
+a frame is stamped too late, rad/s of the slow arm's joints, m along x and z in W of the
+fulcrum's estimate; the others have none."""
 
 
 @dataclass

@@ -9,7 +9,7 @@ from plants.faults.fault import Fault
 from systems.common.block import Block
 from systems.common.parameter import check
 from systems.common.signal import view
-from systems.common.signals import TrackedShaft, Wrench
+from systems.common.signals import Fulcrum, TrackedShaft, Wrench
 from systems.common.step_block import length
 
 type Breaks = Callable[[np.ndarray, np.ndarray, float, float], None]
@@ -45,6 +45,14 @@ def _slow(now: np.ndarray, before: np.ndarray, size: float, period: float) -> No
     now[:] = before + np.clip(now - before, -size * period, size * period)
 
 
+def _aside(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    view(Fulcrum, now).p[0] += size
+
+
+def _deep(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    view(Fulcrum, now).p[2] += size
+
+
 BREAKS: dict[str, Breaks] = {
     "force_stuck": _stuck,
     "force_flipped": _flipped,
@@ -54,6 +62,8 @@ BREAKS: dict[str, Breaks] = {
     "estimate_nan": _nan,
     "tension_nan": _nan,
     "arm_slow": _slow,
+    "fulcrum_aside": _aside,
+    "fulcrum_deep": _deep,
 }
 """How each kind of fault spoils a signal."""
 

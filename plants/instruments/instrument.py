@@ -25,7 +25,9 @@ from plants.common.looks import DARK, GAUZE, STEEL, draw
 from systems.common.parameter import check, parameter
 
 GAUZE_RADIUS = 0.0045
-"""Of the gauze in the jaw, m."""
+"""Of the gauze in the jaw, the longest, m."""
+DRY_GAUZE, WET_GAUZE = 0.002, 0.02
+"""Its mass, kg."""
 
 
 @dataclass
@@ -42,7 +44,7 @@ class InstrumentParams:
     mount_mass: float = parameter(0.16, "of the mount", "kg", least=0.01, most=1)
     shaft_mass: float = parameter(0.04, "of the shaft", "kg", least=0.005, most=0.5)
     gauze_mass: float = parameter(
-        0.0, "of the gauze at the tip, wet about 0.02", "kg", least=0, most=0.1
+        0.0, "of the gauze at the tip: dry 0.002, wet 0.02", "kg", least=0, most=0.1
     )
 
     @property

@@ -120,39 +120,28 @@ class SnakeParams:
         h, d, R = self.half_pitch, self.face, self.ball_radius
         low, high = self.travel
         yield low < high, "travel", "[s_min, s_max], rising"
-        yield (
-            h >= R,
-            "half_pitch",
-            f">= ball_radius R={R:g} m, or the balls of a module overlap",
+        balls = f">= ball_radius R={R:g} m, or the balls of a module overlap"
+        yield h >= R, "half_pitch", balls
+        told = f"< 2 half_pitch={2 * h:g} m, or there is no room between plates"
+        yield d > 0.0, "plate_thickness", told
+        rim = d / max(R, self.body_radius)
+        told = (
+            f"tan(max_bend/2)={t:.4f} < d/r={rim:.4f} with d=h-e/2={d:g} m, or plates "
+            f"touch at the rim; nearest: max_bend={2 * math.atan(rim):.4f}"
         )
-        yield (
-            d > 0.0,
-            "plate_thickness",
-            f"< 2 half_pitch={2 * h:g} m, or there is no room between plates",
+        yield t < rim, "max_bend", told
+        one = R / (2 * d)
+        told = (
+            f"tan(max_bend/2)={t:.4f} < R/(2d)={one:.4f} with d=h-e/2={d:g} m, or two "
+            "postures share wire lengths and the wires cannot all be taut; nearest: "
+            f"max_bend={2 * math.atan(one):.4f} or "
+            f"half_pitch={R / (2 * t) + self.plate_thickness / 2:g}"
         )
-        outer = max(R, self.body_radius)
-        yield (
-            t < d / outer,
-            "max_bend",
-            f"tan(max_bend/2)={t:.4f} < d/r={d / outer:.4f} with d=h-e/2={d:g} m and "
-            f"r={outer:g} m, or neighbouring plates touch at the rim; nearest: "
-            f"max_bend={2 * math.atan(d / outer):.4f}",
-        )
-        yield (
-            t < R / (2 * d),
-            "max_bend",
-            f"tan(max_bend/2)={t:.4f} < R/(2d)={R / (2 * d):.4f} with d=h-e/2={d:g} m, "
-            "or two postures share the same wire lengths and the wires cannot all be "
-            f"taut; nearest: max_bend={2 * math.atan(R / (2 * d)):.4f} or "
-            f"half_pitch={R / (2 * t) + self.plate_thickness / 2:g}",
-        )
+        yield t < one, "max_bend", told
         turn = 2 * math.pi
         holes = sorted(phi % turn for row in self.azimuths() for phi in row)
         after = [*holes[1:], holes[0] + turn]
         gap = min(b - a for a, b in zip(holes, after, strict=True))
-        yield (
-            gap >= LEAST_GAP,
-            "first_azimuths",
-            f"wires at least {math.degrees(LEAST_GAP):.0f} deg apart, two are "
-            f"{math.degrees(gap):.1f}; nearest: 0, 40 and 80 deg",
-        )
+        told = f"wires at least {math.degrees(LEAST_GAP):.0f} deg apart, two are "
+        told += f"{math.degrees(gap):.1f}; nearest: 0, 40 and 80 deg"
+        yield gap >= LEAST_GAP, "first_azimuths", told

@@ -82,7 +82,7 @@ class _Announcer(Listener):
     def on_start(self, event: Any) -> None:
         """Called when numba begins to compile; not when it loads from its cache."""
         if not self._said:
-            print("compiling the blocks, once: about 20 s ...", file=sys.stderr)
+            print("compiling the blocks, once: up to two minutes ...", file=sys.stderr)
         self._said = True
 
     def on_end(self, event: Any) -> None:

@@ -6,8 +6,8 @@
         period: float = parameter(1 / 60, "of the update", "s", above=0.0, most=1.0)
 
 One walker checks what is declared, and names the whole key. Rules across fields are a
-method `rules` that yields what must hold, the field to blame, and what is expected of
-it.
+method `rules` that yields what must hold, the field to blame (`hunt.speed` and
+`points[0]` as well), and what is expected of it: of parameters as of whole scenarios.
 """
 
 from collections.abc import Callable, Iterator
@@ -145,8 +145,17 @@ def check[T: Any](params: T, owner: str | None = None) -> T:
     for holds, name, expected in getattr(params, "rules", lambda: ())():
         if not holds:
             key = f"{owner}.{name}" if owner else name
-            told = {f.name: f.metadata.get("parameter") for f in fields(params)}
-            _refuse(key, getattr(params, name), told[name], expected, None)
+            above, _, last = name.rpartition(".")
+            told = {f.name: f.metadata for f in fields(value_of(params, above))}
+            declared = told.get(last, {}).get("parameter")
+            _refuse(key, value_of(params, name), declared, expected, None)
+    return params
+
+
+def value_of(params: Any, key: str) -> Any:
+    """What a key of a dataclass holds, `player.rates[1]`; itself for an empty one."""
+    for word, index in re.findall(r"(\w+)|\[(\d+)\]", key):
+        params = getattr(params, word) if word else params[int(index)]
     return params
 
 
@@ -164,7 +173,8 @@ def _refuse(key: str, value: Any, told: Any, expected: str, default: Any) -> Non
     unit = f" {told.unit}" if told and told.unit else ""
     shown = f"{default:.4g}" if isinstance(default, float) else default
     hint = "" if default is None else f"; the default is {shown}"
-    raise ParameterError(f"{key}={value!r}{unit}: expected {expected}{hint}")
+    told_value = "" if _dataclasses(key, value) else f"={value!r}{unit}"
+    raise ParameterError(f"{key}{told_value}: expected {expected}{hint}")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ those of accelerometers (`plants.instruments.wrist_sensor`).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from typing import Any
 
@@ -75,6 +75,13 @@ class ToolWrenchParams:
     mass_error: float = parameter(
         0.0, "relative error of the instrument's known mass", least=-0.5, most=0.5
     )
+    gauze_mass: float | None = parameter(
+        None,
+        "of the gauze, as wrist and arm are told; as it is if null",
+        "kg",
+        least=0,
+        most=0.1,
+    )
     force_range: float = parameter(
         60.0, "beyond it a force axis is saturated", "N", above=0, most=500
     )
@@ -106,6 +113,12 @@ def transverse_inertia(params: InstrumentParams) -> float:
         + params.shaft_mass * params.length**2 / 3.0
     )
     return rods + params.gauze_mass * params.length**2
+
+
+def told_instrument[T: InstrumentParams](params: ToolWrenchParams, true: T) -> T:
+    """The instrument with the weight of gauze that wrist and arm are told."""
+    mass = params.gauze_mass
+    return true if mass is None else replace(true, gauze_mass=mass)
 
 
 def silent(lost: Sequence[float], time: float) -> bool:

@@ -9,6 +9,7 @@ from tests.benchmarks import (
     gauze_speed,
     hands,
     kinematic_scenes,
+    monitor_sweep,
     organ_suite,
     resection_speed,
     sensed_suite,
@@ -31,6 +32,7 @@ BENCHMARKS = {
     "sensed": sensed_suite,
     "wrist-step": wrist_step,
     "wrist": wrist_sweep,
+    "monitor": monitor_sweep,
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 

@@ -19,19 +19,21 @@ from diagrams.gauze.kinematic_loop import (
 )
 from diagrams.gauze.kinematic_planners import (
     BYPASS,
+    FIELD,
     PLANNERS,
     ROBOT,
     SPEED,
     Constrained,
+    LocalPlanner,
     around,
 )
 from diagrams.gauze.scenes import Scene, scene
-from systems.bypass import tool_bypass
+from systems.auto_guidance.go_to_target import guide_point
 from systems.bypass.bypass_route import up_and_over
 from systems.bypass.obstacle_tools import Margins
 from systems.common.geometry import limited, norm, plus, scaled, sub
 from systems.common.signal import Vector
-from systems.common.signals import RobotTool
+from systems.common.signals import Guide, RobotTool
 from tests.benchmarks.tracked import tracked
 
 
@@ -50,20 +52,21 @@ class Straight:
         return self._v
 
 
-class RetractTurnInsert:
-    """Up and over everything, always: the complete fallback by itself."""
+class RetractTurnInsert(LocalPlanner):
+    """Up and over everything, always: the bypass's fallback by itself, at its speed."""
 
-    def __init__(self) -> None:
-        self._params = tool_bypass.constants(BYPASS)[0]
-
-    def step(self, dt, robot, obstacle, target, others=()) -> Vector:
-        """The velocity of the robot's tip, see `Planner`."""
+    def _go_to_target(
+        self, dt, robot, obstacle, target, others
+    ) -> tuple[Vector, Guide]:
         tools = around(obstacle, others)
         keep = np.full(len(tools), Margins().safe_distance + BYPASS.goal_slack)
         direction, length = up_and_over(
             tools, keep, ROBOT.least_insertion, robot.fulcrum, robot.tip, target.p
         )
-        return scaled(min(SPEED, BYPASS.approach_rate * length), direction)
+        wanted = scaled(min(SPEED, BYPASS.approach_rate * length), direction)
+        change = limited(sub(wanted, self._v1_tip), BYPASS.max_acceleration * dt)
+        guide = guide_point(robot, obstacle, target.p, BYPASS.proportion_floor)
+        return plus(self._v1_tip, change), guide
 
 
 ALL = {
@@ -72,8 +75,10 @@ ALL = {
     if name != "field only" and not name.startswith("literal")
 } | {
     "straight + constraint": lambda: Constrained(Straight()),
-    "retract, turn, insert": lambda: Constrained(RetractTurnInsert()),
+    "retract, turn, insert": lambda: Constrained(RetractTurnInsert(**FIELD)),
+    "the same alone": lambda: Constrained(RetractTurnInsert(**FIELD, field_only=True)),
 }
+"""Alone: without the paper's fuzzy sum between it and the constraint."""
 FIRST = {"standing": 1.0, "moving": 1.0, "tracked": 1.0, "blocked": 0.2, "crowded": 0.3}
 """The sets, and their sizes as shares of the number of scenes."""
 

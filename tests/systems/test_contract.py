@@ -213,15 +213,9 @@ OBSERVE = {
     *("GridMapping", "Perception", "RobotLocation", "SnakeLoad", "SnakeLocation"),
     *("StationTarget", "Tracking"),
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
-    *(
-        "BallLocation",
-        "Registration",
-        "SensorZeroing",
-        "TipLoad",
-        "ToolLoad",
-        "WrenchWatch",
-    ),
-    *("TissueForce", "WallWrench"),
+    *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
+    *("NavigationMonitor", "TissueForce", "WallWrench"),
+    "SensorZeroing",
 }
 """Blocks that command nothing."""
 LEAD = {"ProcedurePlayer", "TipReference"}

@@ -22,7 +22,7 @@ from plants.tissue.volume import Volume
 from systems.common.parameter import parameter
 from systems.resection.planning.draws import new_draws
 from systems.resection.planning.entry import PILOT, entry_pass
-from systems.resection.planning.reach import coverable, search
+from systems.resection.planning.search import coverable, search
 from systems.resection.planning.session import Session
 
 Matrix = NDArray[np.float64]

@@ -20,7 +20,8 @@ from systems.common.parameter import Rules, check, parameter
 from systems.resection.planning.draws import new_draws
 from systems.resection.planning.entry import PILOT, entry_pass, radius_of
 from systems.resection.planning.procedure import ELEMENTARY, Procedure
-from systems.resection.planning.reach import Reach, coverable, search
+from systems.resection.planning.reach import Reach
+from systems.resection.planning.search import coverable, search
 from systems.resection.planning.session import STROKES, Session
 from systems.resection.planning.strokes import (
     Goal,

@@ -11,6 +11,7 @@ be reached. It ends when steps hardly gain anything; a longer search finds littl
 
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 import hashlib
 from pathlib import Path
@@ -34,29 +35,21 @@ from systems.common.archive import (
 )
 from systems.resection.planning.draws import Draws, new_draws
 from systems.resection.planning.entry import PILOT, entry_pass
-from systems.resection.planning.growth import grow, tilted, tool_posture
+from systems.resection.planning.growth import tilted, tool_posture
+from systems.resection.planning.search import Search, opening
 from systems.resection.planning.session import Session
 
 FORMAT = 2
 """Of the file of what is reachable; 2: from how many nodes it began."""
 
-ROUND = 20_000
-"""Attempts between two looks at what is left, at effort 1."""
-
-WEARY = 2000
-"""Failed attempts after which a voxel is asked for no more, at effort 1."""
-
-LEAST = 3
-"""Voxels that a step must free."""
-
 PITCH = 2e-3
 """Of the entry in thought, in m."""
 
+PAUSE = 5.0
+"""Between two times that a search is saved, in s; what is found is the same."""
+
 LEAST_LUMP = 2e-9
 """Volume in m3 of the smallest part that is told."""
-
-STALL, ROUNDS = 0.003, 3
-"""A search whose last rounds gain less of the tumour than this has ended."""
 
 
 @dataclass
@@ -107,6 +100,7 @@ def find_reach(
     explain: bool = True,
     progress: Callable[[float], None] = lambda share: None,
     anew: bool = True,
+    file: Path | None = None,
 ) -> Reach:
     """Computes the reachable part of a session's tumour.
 
@@ -119,6 +113,8 @@ def find_reach(
         anew: From its beginning, through the first entry: what has been removed
             does not matter. Otherwise from how things stand, through the entry in
             which the robot is.
+        file: Where the search is saved every few seconds, and goes on from if it was
+            cut off.
     """
     start = perf_counter()
     scratch = session.thought()
@@ -130,13 +126,21 @@ def find_reach(
     for bend in (PILOT, session.params.max_bend):
         scratch.commit(entry_pass(scratch, bend, PITCH, "entry"))
     draws = new_draws(seed)
-    search(scratch, draws, effort, progress)
+    going, key = Search(scratch, draws, effort), f"{anew} {_key(session, seed, effort)}"
+    _go_on(going, file, key)
+    saved = start
+    while not going.ended:
+        going.step()
+        progress(going.share)
+        if file and perf_counter() - saved > PAUSE:
+            write_archive(file, {"format": FORMAT, "key": key}, going.arrays())
+            saved = perf_counter()
     mask = volume.resected
     fraction = int(mask.sum()) / int((volume.labels == TUMOUR).sum())
     lumps = []
     if explain:
-        opening = _opening(volume, scratch.body.radius)
-        lumps = _lumps(scratch, volume, opening, draws)
+        wide = opening(volume, scratch.body.radius)
+        lumps = _lumps(scratch, volume, wide, draws)
     nodes = int(scratch.tree.size[0])
     return Reach(
         mask,
@@ -150,58 +154,14 @@ def find_reach(
     )
 
 
-def search(
-    session: Session,
-    draws: Draws,
-    effort: float = 1.0,
-    progress: Callable[[float], None] = lambda share: None,
-) -> None:
-    """Grows a session's tree, in place, until steps gain hardly anything.
-
-    Args:
-        session: In thought: what steps free is gone, but no step is recorded.
-        draws: Where random numbers come from.
-        effort: Scales the search.
-        progress: Called with the share of the tumour that is reached.
-    """
-    volume, body = session.volume, session.body
-    s = volume.space()
-    total = int(np.count_nonzero(volume.labels == TUMOUR))
-    can = coverable(volume, body.radius).reshape(-1)
-    wanted = np.flatnonzero(can & (s.tau == SOLID)).astype(np.int32)
-    tries, seats = np.zeros(len(wanted), np.int32), seats_of(volume, body.radius)
-    attempts, weary = max(1, round(ROUND * effort)), max(1, round(WEARY * effort))
-    gone = [int(np.count_nonzero(volume.resected))]
-    while len(wanted):
-        volume.forget_journals()
-        session.make_room()
-        grow(
-            s, body, session.tree, draws, wanted, tries, seats, attempts, weary, LEAST,
-            False, session.why,
-        )  # fmt: skip
-        left = (s.tau[wanted] == SOLID) & (tries < weary)
-        wanted, tries = wanted[left], tries[left]
-        gone.append(gone[-1] + int(s.used[0]))
-        progress(gone[-1] / total)
-        if len(gone) > ROUNDS and gone[-1] - gone[-1 - ROUNDS] < STALL * total:
-            break
-
-
-def coverable(volume: Volume, radius: float) -> NDArray[np.bool_]:
-    """Tumour that a ball covers which stays where it may be, (nx, ny, nz)."""
-    return (volume.labels == TUMOUR) & (volume.allowed > 0) & _opening(volume, radius)
-
-
-def seats_of(volume: Volume, radius: float) -> NDArray[np.int32]:
-    """The nearest voxel where a ball may be, flat index, of every voxel, flat."""
-    fits = volume.inside >= radius / volume.spacing
-    if not fits.any():
-        return np.arange(fits.size, dtype=np.int32)
-    nearest = ndimage.distance_transform_edt(
-        ~fits, return_distances=False, return_indices=True
-    )
-    seats: NDArray = np.ravel_multi_index(tuple(nearest), fits.shape)
-    return seats.astype(np.int32).reshape(-1)
+def _go_on(going: Search, file: Path | None, key: str) -> None:
+    """Goes on from where a search of this kind was cut off, if there is one."""
+    if file is None or not file.exists():
+        return
+    with suppress(ValueError):  # otherwise from its beginning
+        meta, arrays = read_archive(file, "search", FORMAT)
+        if meta["key"] == key:
+            going.resume(arrays)
 
 
 def save_reach(
@@ -257,13 +217,6 @@ def _key(session: Session, seed: int, effort: float) -> str:
     labels = hashlib.sha256(session.volume.labels.tobytes()).hexdigest()
     body = f"{session.params} {session.clearance} {session.accuracy}"
     return f"{labels} {session.volume.margin} {body} {seed} {effort}"
-
-
-def _opening(volume: Volume, radius: float) -> NDArray[np.bool_]:
-    """What a ball that stays in what it may remove can cover."""
-    r = radius / volume.spacing
-    fits = volume.inside >= r - 0.87
-    return ndimage.distance_transform_edt(~fits) <= r + 0.87
 
 
 TOO_NARROW = "too narrow for the tool"

@@ -70,15 +70,15 @@ def test_set_changes_what_runs(tmp_path):
         (["run", "gauze_static", "--set", "robot.p_WP=[0,0,.nan]"], "finite"),
         (
             ["run", "gauze_static", "--set", "obstacle.p_WG=[0.0, 0.001, 0.0]"],
-            "expected at least 0.02 m",
+            "trocars >= 0.02 m apart",
         ),
         (
             ["run", "gauze_static", "--set", "target.points=[[0.1, 0.0, -0.4]]"],
-            "out of reach",
+            "within reach through",
         ),
         (
             ["run", "gauze_static", "--set", "camera.p_WS=[0.2, 0.2, -0.1]"],
-            "outside the view cone",
+            "in the camera's view",
         ),
         (["run", "gauze_static", "--set", "recording=nowhere.csv"], "nowhere.csv"),
         (["run", "gauze_static", "--set", "duration=0"], "duration=0"),

@@ -52,5 +52,7 @@ def test_bad_input_is_told_before_the_run(override, message):
 
 
 def test_a_tool_that_hunts_has_no_hand_of_its_own():
-    with pytest.raises(ScenarioError, match=r"hunt.speed=0.01: expected 0 together"):
+    with pytest.raises(
+        ScenarioError, match=r"hunt.speed=0.01 m/s: expected 0 together"
+    ):
         load_scenario("gauze_static", ["hunt.speed=0.01", "obstacle.hand.seed=3"])

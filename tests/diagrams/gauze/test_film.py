@@ -11,8 +11,6 @@ from diagrams.gauze import film
 from diagrams.studies import load_scenario
 from tests.runs import run
 
-pytestmark = pytest.mark.xdist_group("gauze")
-
 
 def test_a_picture_shows_tissue_and_tools_or_it_is_said_why_not():
     if not film.can_render():

@@ -9,8 +9,6 @@ from diagrams.studies import load_scenario
 from systems.motion.tissue_press import Phase
 from tests.runs import run
 
-pytestmark = pytest.mark.xdist_group("gauze")
-
 
 def test_the_lobe_is_passed_and_nothing_touched():
     figures = run("gauze_organs").metrics
@@ -72,7 +70,7 @@ def test_clearance_and_force_are_drawn():
     [
         ("wrist=known", "expected 'pwe' with press.active"),
         ("tip_load.active=true", "tip_load.active=True: expected False with press"),
-        ("organs=[]", "expected organs to press on"),
+        ("organs=[]", "expected one to press on"),
         ("organs=[{name: liver, file: nowhere.stl}]", "expected a file"),
         ("organs=[{name: liver, shape: spleen}]", "one of liver"),
         ("organs=[{name: target}]", "expected names that differ"),

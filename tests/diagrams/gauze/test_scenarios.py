@@ -194,6 +194,29 @@ def test_gauze_on_a_patient_who_breathes():
     assert [stop["reason"] for stop in figures["stops"]] == ["probing the wall"]
 
 
+WET, DRY_TOLD = "instrument.gauze_mass=0.02", "tool_wrench.gauze_mass=0.002"
+
+
+def test_gauze_has_its_weight_and_the_wrist_is_told_it():
+    dry, wet = run("gauze_breathing"), run("gauze_breathing", WET)
+    assert dry.scenario.instrument.gauze_mass == 0.002
+    for key in ("rms_lateral_force", "rms_fulcrum_error"):
+        assert wet.metrics[key] == pytest.approx(dry.metrics[key], rel=0.02)
+    # Told wrongly, 18 g at the tip are taken for the wall's: 0.4 mm of its spring.
+    wrong = run("gauze_breathing", WET, DRY_TOLD).metrics
+    assert 0.15 < wrong["rms_lateral_force"] < 0.3
+    assert wrong["rms_lateral_force"] > 2.5 * wet.metrics["rms_lateral_force"]
+    assert wrong["max_fulcrum_error"] < 1e-3
+    assert wrong["reached"] and not wrong["contact"]
+    assert wrong["final_tip_error"] < 1e-3
+
+
+def test_gauze_that_cannot_be_is_refused():
+    for key in ("instrument", "tool_wrench"):
+        with pytest.raises(ScenarioError, match=rf"{key}.gauze_mass=0.5 kg: .*<= 0.1"):
+            load_scenario("gauze_static", [f"{key}.gauze_mass=0.5"])
+
+
 def depth_error(r: Run) -> np.ndarray:
     """Error of the estimated fulcrum along the shaft [m]."""
     error = r.wrist.fulcrum.p - r.wall.fulcrum.p
@@ -250,7 +273,7 @@ def test_target_out_of_reach_stops_the_robot_until_it_comes_back():
 
 
 def test_a_start_out_of_the_arms_reach_is_refused():
-    with pytest.raises(ScenarioError, match=r"out of reach|no posture"):
+    with pytest.raises(ScenarioError, match=r"within reach|no posture"):
         simulate(load_scenario("gauze_static", ["robot.p_WG=[0.45, 0.0, 0.0]"]))
 
 

@@ -183,7 +183,7 @@ def test_auto_large():
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("mask=none.nrrd", "no such file"),
+        ("mask=none.nrrd", "a file that is there"),
         ("spacing=0.0", "spacing=0.0 m: expected >= 0.0001"),
         ("tumour.length=0.5", "tumour.length=0.5 m: expected >= 0.005 and <= 0.1"),
         ("access.direction=[0, 0, 0]", "expected a direction"),

@@ -39,6 +39,33 @@ def test_step_of_the_wall():
     assert figures["jumps_followed"] == 1
 
 
+def noticed(r, start):
+    """When the monitor found navigation not to be accurate, from a time on [s]."""
+    time, told = r.signals["time"], r.wrist.accuracy
+    return float(time[(time >= start) & (told.accurate < 0.5)][0] - start)
+
+
+def test_whether_navigation_is_accurate_is_said_while_it_runs():
+    for name in ("pwe_arc", "pwe_arc_breathing", "pwe_breathing", "pwe_insufflation"):
+        clean = run(name)
+        assert clean.metrics["accuracy_alarms"] == 0
+        assert clean.metrics["time_inaccurate"] < 2.0  # the probe
+        late = clean.signals["time"] > 2.0
+        assert clean.wall.fulcrum_error.distance[late].max() < 1e-3
+    step = run("pwe_step")
+    assert step.metrics["accuracy_alarms"] == 1
+    assert noticed(step, 5.0) < 0.05
+    assert step.wrist.accuracy.accurate[-1] == 1.0  # followed
+    for kind, size, within in (
+        ("fulcrum_aside", 0.005, 0.05),
+        ("force_bias", 0.3, 0.3),
+    ):
+        fault = f"faults=[{{kind: {kind}, start: 4, duration: 2, size: {size}}}]"
+        wrong = simulate(load_scenario("pwe_arc", ["compare=[]", fault], duration=7.0))
+        assert noticed(wrong, 4.0) < within
+        assert wrong.metrics["accuracy_alarms"] == 1
+
+
 def test_breathing_under_a_ventilator_against_the_printed_law():
     figures = run("pwe_breathing").metrics
     assert figures["rms_lateral_force"] <= 0.08

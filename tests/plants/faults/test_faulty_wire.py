@@ -6,8 +6,8 @@ import pytest
 from plants.faults.fault import KINDS, Fault
 from plants.faults.faulty_wire import BREAKS, FaultyWire
 from systems.common.parameter import ParameterError
-from systems.common.signal import flat, view
-from systems.common.signals import TrackedShaft, Wrench
+from systems.common.signal import example, flat, view
+from systems.common.signals import Fulcrum, TrackedShaft, Wrench
 
 SAMPLE = 1 / 120
 
@@ -69,6 +69,17 @@ def test_a_slow_arm_moves_no_faster():
     )
     np.testing.assert_allclose(np.diff(rows[:, 0]), 0.6 * SAMPLE)
     np.testing.assert_allclose(rows[1:, 1], 0.001)
+
+
+@pytest.mark.parametrize(
+    ("kind", "off"),
+    [("fulcrum_aside", [0.005, 0.0, 0.0]), ("fulcrum_deep", [0.0, 0.0, 0.005])],
+)
+def test_an_estimate_that_is_wrong(kind, off):
+    true = flat(example(Fulcrum))
+    rows = told(Fault(kind, duration=1.0, size=0.005), Fulcrum, 2, lambda k: true)
+    np.testing.assert_allclose(view(Fulcrum, rows).p - view(Fulcrum, true).p, [off] * 2)
+    assert (rows != true).sum() == 2
 
 
 def test_an_unknown_kind_is_named():
