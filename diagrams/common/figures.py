@@ -91,6 +91,7 @@ FIGURES = {
     "max_body_deviation": Figure("m", "of the snake's body off its plan, by the tube"),
     "max_coupler_error": Figure("rad", "greatest between the balls of a module"),
     "gate_opened": Figure("s", "when the snake was let out"),
+    "max_stray": Figure("m", "of the tool from its way while it is halted"),
     "withdrawal_time": Figure("s", "longest that drawing back took"),
     "ik_refused": Figure("%", "share of poses without a posture"),
     "drums_limited": Figure("%", "share of the time with a drum at its limit"),

@@ -83,7 +83,10 @@ KEYHOLE_WIRES = (
     ("organ_motion.y0", "snake_in_organ.entry"),
 )
 
-CARVER_WIRES = (("snake_in_organ.posture_E", "tissue_carver.posture"),)
+CARVER_WIRES = (
+    ("snake_in_organ.posture_E", "tissue_carver.posture"),
+    ("snake_task.cutting", "tissue_carver.cutting"),
+)
 
 EXPORTS = WRIST_EXPORTS | {
     "robot.tool": "robot_location.robot_tool",

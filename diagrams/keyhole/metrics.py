@@ -75,6 +75,7 @@ def measure(run: Any) -> dict[str, Any]:
     phases = log_of_phases(run)
     gate = [one["start"] for one in phases if one["phase"] == "resect"]
     drawn = withdrawals(run)
+    halted = np.round(run.operation.phase.code) == Phases.STOPPED
     figures: dict[str, Any] = {
         "rms_tool_error": rms(errors),
         "max_tool_error": most(errors),
@@ -90,6 +91,7 @@ def measure(run: Any) -> dict[str, Any]:
         "max_coupler_error": float(run.snake.coupler_error.angle.max()),
         "gate_opened": gate[0] if gate else None,
         "withdrawal_time": max(drawn) if drawn else None,
+        "max_stray": most(tool_errors(run)[halted]),
         "ik_refused": share(run.ik.status.code[at_work] != 0),
         "drums_limited": share(run.drums.limited.code[at_work] != 0),
         "estimates_refused": int(run.wrist.fulcrum.refused[-1]),

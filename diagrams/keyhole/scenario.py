@@ -27,7 +27,7 @@ from systems.common.geometry import pose_of
 from systems.common.parameter import Rules, parameter, part
 from systems.common.reach_limits import ReachLimits
 from systems.keyhole.phases import PhasesParams
-from systems.keyhole.snake_task import SnakeTaskParams, body_deviation
+from systems.keyhole.snake_task import FAR, SnakeTaskParams, body_deviation
 from systems.keyhole.tube_task import TubeTaskParams
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
@@ -211,7 +211,9 @@ class KeyholeScenario(Scenario, WristSettings):
     wrench_watch: WrenchWatchParams = clocked(WrenchWatchParams)
     navigation_monitor: NavigationMonitorParams = clocked(NavigationMonitorParams)
     # Half of an instrument's: the snake's couplers feel what the tube's end does.
-    passive_wrist: WristParams = clocked(WristParams, wrist_acceleration=2.5)
+    passive_wrist: WristParams = clocked(
+        WristParams, wrist_acceleration=2.5, slides=True
+    )
     circle: CircleParams = part(CircleParams)
     operation: OrganOperation = part(OrganOperation)
     joints: JointCommandsParams = clocked(JointCommandsParams, roll=2.1)
@@ -312,8 +314,18 @@ def circle_postures(scenario: KeyholeScenario) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reach_rules(scenario: KeyholeScenario) -> Rules:
-    """Tube and trocar reach the station, at rest and over a breath."""
+    """The tube begins in its trocar; the two reach the station over a breath."""
     limits, tube = ReachLimits(), scenario.instrument
+    down = np.subtract(scenario.robot.p_WP, scenario.robot.p_WG)
+    inside = float(np.linalg.norm(down))
+    told = (
+        f"{limits.min_insertion} to {limits.max_insertion} m inside the trocar at "
+        f"{scenario.robot.p_WG}, {math.degrees(limits.max_tilt):.0f} deg at most off "
+        "its vertical"
+    )
+    upright = -down[2] >= inside * math.cos(limits.max_tilt)
+    begins = limits.min_insertion <= inside <= limits.max_insertion and upright
+    yield begins, "robot.p_WP", told
     depth = math.dist(scenario.entry.p_WE, scenario.robot.p_WG)
     tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
     low = limits.min_insertion + scenario.tube_task.standoff
@@ -354,9 +366,12 @@ def clearance_rules(scenario: KeyholeScenario) -> Rules:
     C = pose_of((gap * s, 0.0, gap * (c - 1.0)), (c, 0.0, -s), (s, 0.0, c))
     geometry = o.snake.half_pitch, o.snake.tool_offset, o.snake.max_bend
     away = body_deviation(np.array(BENT), C, E, *geometry)
+    tilted = f"wall and organ tilt the tube by {math.degrees(angle):.1f} deg"
+    told = f"less, or more in phase: {tilted}, which the snake cannot make up for"
+    yield away < FAR, "organ_motion.breathing", told
     told = (
-        f">= {away:.2g} m, by which the body leaves its plan when wall and organ tilt "
-        f"the tube by {math.degrees(angle):.1f} deg; or motions more in phase"
+        f">= {away:.2g} m, by which the body leaves its plan when {tilted}; or motions "
+        "more in phase"
     )
     yield away <= o.clearance, "operation.clearance", told
 

@@ -57,6 +57,12 @@ class Entry(NamedTuple):
     number: Annotated[float, Field("1", "0 for the first", 0.0)]
 
 
+class Cutting(NamedTuple):
+    """Whether the tool has power: without it, it pushes tissue aside."""
+
+    on: Annotated[float, Field("1", "1 if it cuts, else 0", 1.0)]
+
+
 class Removed(NamedTuple):
     """What tissue is gone."""
 
@@ -89,6 +95,7 @@ def carve(
     x1: Any,
     pitch: float,
     time: int,
+    cutting: bool,
 ) -> Any:
     """Moves the true body from one posture to the next, carving.
 
@@ -101,6 +108,7 @@ def carve(
         x1: Posture (7,) now.
         pitch: Longest way of the tool between stamps, in m.
         time: Arrival time of what is freed.
+        cutting: Whether anything is.
 
     Returns:
         Tumour voxels and others freed, checks at which the body met tissue, the
@@ -120,7 +128,8 @@ def carve(
         place(b, x, c)
         hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
-        stamp(s, c[7], b.radius, time)
+        if cutting:
+            stamp(s, c[7], b.radius, time)
         for m in range(first, s.used[0]):
             if labels[s.freed[m]] == TUMOUR:
                 tumour += 1
@@ -193,7 +202,15 @@ class Carving:
         self.latest = self.done.index
         self.space: Space = self.volume.space()
 
-    def move(self, index: int, x0: Any, x1: Any, pitch: float, entry: int = 0) -> Any:
+    def move(
+        self,
+        index: int,
+        x0: Any,
+        x1: Any,
+        pitch: float,
+        entry: int = 0,
+        cutting: bool = True,
+    ) -> Any:
         """Carves from posture x0 to x1 as the index after `index`, through an entry.
 
         Its channel is bored if it has not been: the access robot's part, of which
@@ -219,6 +236,7 @@ class Carving:
             x1,
             pitch,
             index + 1,
+            cutting,
         )
         return tumour + bored, *others
 
@@ -237,6 +255,7 @@ class TissueCarver(Block):
     Port ``posture`` accepts the snake's true `Posture`.
     Port ``entry`` accepts the number of the channel it works through; the first if
     nothing is connected.
+    Port ``cutting`` accepts whether the tool has power, `Cutting`; unconnected it has.
     Port ``index`` emits how many `Moves` were carved.
     Port ``removed`` emits the tissue `Removed`.
     Port ``touched`` emits what was `Touched`.
@@ -258,6 +277,7 @@ class TissueCarver(Block):
         self._voxel = self.carving.volume.voxel
         self._posture = self.signal_in("posture", Posture)
         self._entry = self.signal_in("entry", Entry)
+        self._cutting = self.signal_in("cutting", Cutting)
         done = self.carving.done
         self.state_out("index", Moves, flat(Moves(float(done.index))))
         self.state_out("removed", Removed, flat(done.removed))
@@ -293,11 +313,13 @@ class TissueCarver(Block):
 
     def _update(self, context: Any) -> Sequence[Any]:
         (index,), removed, touched, (way,), before = self._state(context)
-        x, entry = self._posture.Eval(context), 0
+        x, entry, cutting = self._posture.Eval(context), 0, True
         if self._entry.HasValue(context):
             entry = int(self._entry.Eval(context)[0])
+        if self._cutting.HasValue(context):
+            cutting = bool(self._cutting.Eval(context)[0] == 1.0)
         tumour, healthy, hits, nearest, moved = self.carving.move(
-            int(index), np.array(before), x, self._params.pitch, entry
+            int(index), np.array(before), x, self._params.pitch, entry, cutting
         )
         so_far = Touched(*touched)
         if math.isfinite(nearest):

@@ -3,8 +3,8 @@
 The way has four legs, on a clock of its own: out of the tube, straight in its frame C;
 over to the organ's frame E, still outside the organ; in through the entry while the
 tube advances; and to where the plan begins. From there the plan's postures are played.
-A retreat straightens the last module: what it swept lies about the intermediate axis,
-so the tool goes to the middle of what it has itself made free.
+A retreat goes back along the plan, quicker than it came: there is no posture on it to
+which the tissue has not made room.
 
 All postures but those of the first leg are meant in E. What is sent is the tool's pose
 in C, where tube and organ will be when it is reached.
@@ -23,6 +23,8 @@ from plants.snake.kinematics import POINTS, corners
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
 from plants.snake.tool_target import seen_from, target_of
+from plants.tissue.tissue_carver import Cutting
+from systems.common.block import VectorInput
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     Pose,
@@ -74,23 +76,24 @@ class SnakeTaskParams:
         True, "whether it makes up for tube and organ; else C is taken for E"
     )
     retreat: float = parameter(
-        0.15, "time in which the tool draws back", "s", above=0.0, most=5.0
-    )
-    back: float = parameter(
-        2.0, "time in which it comes back", "s", above=0.0, most=60.0
+        0.25, "of the plan, that the tool goes back at a stop", "s", above=0, most=60
     )
     rewind: float = parameter(
-        3.0, "how much faster than the plan it goes home", above=0.0, most=10.0
+        2.5, "how much faster than the plan it goes back", above=0.0, most=10.0
+    )
+    turnabout: float = parameter(
+        40.0, "acceleration of the plan's clock", "1/s", above=0.0, most=1e3
     )
     period: float = parameter(1 / 120, "of the update", "s", above=0.0, most=0.1)
 
 
 class Way(NamedTuple):
-    """Clocks of the way and of the plan in s, and share of the retreat."""
+    """Clocks of the way and of the plan in s, the latter's rate, and its farthest."""
 
     way: float
     clock: float
-    retreat: float
+    rate: float
+    mark: float
 
 
 @compiled
@@ -164,40 +167,59 @@ def evenly(postures: Floats, times: Floats, turn: float = -1.0) -> Plan:
 
 
 @compiled
-def _go(c: Any, now: Way, phase: Phase) -> tuple[Way, SnakeStatus]:
-    """The way one period later, and the status."""
-    way, clock, retreat = now
+def _go(
+    c: Any, now: Way, phase: Phase, organ: OrganMotion
+) -> tuple[Way, SnakeStatus, Cutting]:
+    """The way one period later, the status, and whether the tool has power."""
+    way, clock, rate, mark = now
     code = float(Phases.STOPPED.value) if isnan(phase.code) else phase.code
+    if code == Phases.RESECT.value and organ.alarm != 0.0:  # the phase comes later
+        code = float(Phases.STOPPED.value)
     dt, whole = c.period, c.ends[3]
-    retreat += dt / c.retreat if code == Phases.STOPPED.value else -dt / c.back
-    retreat = min(max(retreat, 0.0), 1.0)
-    if code == Phases.RESECT.value and retreat == 0.0:
+    back = max(mark - c.retreat, 0.0)
+    wanted = 0.0
+    if code == Phases.RESECT.value:
         if way >= whole:
-            clock = min(clock + dt, c.end)
+            wanted = 1.0
         way = min(way + dt, whole)
-    if code == Phases.RETRACT.value and retreat == 0.0:
+    elif code == Phases.STOPPED.value and clock > back:
+        wanted = -c.rewind
+    elif code == Phases.RETRACT.value:
         if clock >= c.end:
-            clock = 0.0 if way < whole else clock
+            clock = mark = 0.0 if way < whole else clock
             way = max(way - dt, 0.0)
         elif clock > 0.0:
-            clock = max(clock - c.rewind * dt, 0.0)
+            wanted = -c.rewind
         else:
             way = max(way - dt, 0.0)
+    rate += min(max(wanted - rate, -c.turnabout * dt), c.turnabout * dt)
+    least = back if code == Phases.STOPPED.value else 0.0
+    after = min(max(clock + rate * dt, min(least, clock)), c.end)
+    if after == clock:
+        rate = 0.0
+    clock, mark = after, max(mark, after)
+    drawn = min(max(mark - now.clock, 0.0) / max(mark - back, 1e-9), 1.0)
+    if code != Phases.STOPPED.value:
+        drawn = 0.0
+    elif back >= mark:
+        drawn = 1.0
     over, entered = c.ends[1], c.ends[2]
     share = (now.way - over) / (entered - over)
-    rate = 0.0
-    if 0.0 < share < 1.0 and code in (Phases.RESECT.value, Phases.RETRACT.value):
-        rate = c.advance * 6.0 * share * (1.0 - share) / (entered - over)
-        if code == Phases.RETRACT.value:
-            rate = -rate
-    return Way(way, clock, retreat), SnakeStatus(
+    speed = 0.0
+    if 0.0 < share < 1.0 and way != now.way:
+        speed = c.advance * 6.0 * share * (1.0 - share) / (entered - over)
+        if way < now.way:
+            speed = -speed
+    cutting = Cutting(1.0 if code == Phases.RESECT.value else 0.0)
+    status = SnakeStatus(
         now.way / whole,
         c.advance * smooth(share),
-        rate,
+        speed,
         now.clock,
         min(c.end - now.clock, 1e6),
-        now.retreat,
+        drawn,
     )
+    return Way(way, clock, rate, mark), status, cutting
 
 
 @compiled
@@ -215,7 +237,6 @@ def _tool(c: Any, plan: Any, now: Way) -> ToolTarget:
         x[0] = c.before + smooth((now.way - over) / (entered - over)) * (
             c.entry - c.before
         )
-    x[5:] *= 1.0 - smooth(now.retreat)
     return target_of(x, c.half_pitch, c.tool_offset)
 
 
@@ -264,7 +285,7 @@ def _aim(
     c, at, entry = constants[0], read_tube(tube), read_organ(organ)
     if not (finite_tube(at) and finite_organ(entry)):
         return held.copy(), FAR
-    now, out, over = Way(way[0], way[1], way[2]), c.ends[0], c.ends[1]
+    now, out, over = Way(way[0], way[1], way[2], way[3]), c.ends[0], c.ends[1]
     z = c.inside + c.speed * min(now.way, out) + c.length
     in_tube = write_target(ToolTarget((0.0, 0.0, z), _ALONG, _ALONG))
     E = pose_of(entry.p, row_of(c.axes, 0), row_of(c.axes, 1))
@@ -283,7 +304,7 @@ def _aim(
 @compiled
 def _reference(constants: Floats, plan: Any, way: Floats) -> Floats:
     """The elements of the tool's target in E."""
-    return write_target(_tool(constants[0], plan, Way(way[0], way[1], way[2])))
+    return write_target(_tool(constants[0], plan, Way(way[0], way[1], way[2], way[3])))
 
 
 class SnakeTask(StepBlock):
@@ -300,6 +321,8 @@ class SnakeTask(StepBlock):
     Port ``reference`` emits the `ToolPose` in E of this instant.
 
     Port ``status`` emits the `SnakeStatus`.
+
+    Port ``cutting`` emits whether the tool has power, `Cutting`: in RESECT alone.
 
     Port ``deviation`` emits the `BodyDeviation` of the posture that is next.
     """
@@ -364,22 +387,23 @@ class SnakeTask(StepBlock):
         )
         self._plan = plan.arrays
         self._tube = self.signal_in("tube", TubePose)
-        self._organ = self.signal_in("organ", OrganMotion)
-        gives, told = [Way, SnakeStatus], {"phase": Phase}
+        gives = [Way, SnakeStatus, Cutting]
+        told = {"phase": Phase, "organ": OrganMotion}
         go, on = self._runner(_go, [self._constants], [Way], told, gives, False, {})
-        self.DeclareDiscreteState(flat(Way(0.0, 0.0, 0.0)))
+        self._organ = VectorInput(self.GetInputPort("organ"))
+        self.DeclareDiscreteState(flat(Way(0.0, 0.0, 0.0, 0.0)))
         held = ToolTarget((0.0, 0.0, self._inside + length), _ALONG, _ALONG)
         self._held = self.DeclareDiscreteState(flat(held))
         state = {self.xd_ticket()}
         self._next = self.cached("next", go, state | on)
-        reads = {*state, *on, self._tube.ticket(), self._organ.ticket()}
+        reads = {*state, *on, self._tube.ticket()}
         self._target = self.cached("target", self._calc_target, reads)
         aimed = {self._target.ticket()}
         self.signal_out("target", ToolTarget, self._calc_aim, aimed)
         self.signal_out("deviation", BodyDeviation, self._calc_deviation, aimed)
         self.signal_out("reference", ToolPose, self._calc_reference, state)
         last = size(Way)
-        self._emit(self._next, {"status": SnakeStatus}, last)
+        self._emit(self._next, {"status": SnakeStatus, "cutting": Cutting}, last)
         self.update_every(
             p.period,
             lambda context: [

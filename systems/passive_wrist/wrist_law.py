@@ -34,6 +34,7 @@ from systems.common.geometry import (
     plus,
     scaled,
     sub,
+    unit,
     xyz,
 )
 from systems.common.parameter import Rules, check, parameter
@@ -97,6 +98,8 @@ class WristParams:
     # Of the relaxing motion, at the sensor.
     wrist_speed: float = parameter(0.25, "at the most", "m/s", above=0, most=1)
     wrist_acceleration: float = parameter(5.0, "at the most", "m/s^2", above=0, most=50)
+    # Along the shaft it turns nothing: a depth that jumps then costs no force.
+    slides: bool = parameter(False, "whether the pivot follows at once along the shaft")
     probe: bool = parameter(True, "whether an unknown stiffness is probed")
     probe_force: float = parameter(1.0, "at the most", "N", above=0, most=5)
     probe_travel: float = parameter(
@@ -240,6 +243,10 @@ def _move_pivot(
     dt = c.period
     fastest, hardest = c.wrist_speed * ratio, c.wrist_acceleration * ratio
     error = sub(target, xyz(s, PIVOT))
+    if c.slides:
+        u = unit(sub(xyz(s, TIP), xyz(s, PIVOT)))
+        _put(s, PIVOT, along(xyz(s, PIVOT), dot(error, u), u))
+        error, velocity = across(error, u), across(velocity, u)
     more = sub(over(error, dt), velocity)
     excess = norm(more)
     if excess <= max(hardest * dt, 0.2 * fastest):  # keeps up

@@ -36,6 +36,7 @@ _AVERAGED = 6  # frames in an entry of the record in which the rate is searched
 _SHORTEST = 480  # frames before the first search
 _SHARE = 1.5  # s of the record in which a lost phase is searched
 _EVERY = 12  # frames between two searches
+_STRAYED = 2.5  # times the noise
 
 Floats = np.ndarray
 read_frame = reader(TrackedShaft)
@@ -145,13 +146,14 @@ def correct(c: Any, s: Floats, T: Floats, e: Floats, slope: Floats, dt: float) -
 
 
 @compiled
-def track(s: Floats, z: Floats, dt: float) -> None:
-    """The plain track: an alpha-beta filter of the frames."""
+def track(c: Any, s: Floats, z: Floats, dt: float) -> None:
+    """The plain track: an alpha-beta filter of the frames, quick where they stray."""
     p, v = s[PLAIN : PLAIN + 3], s[PLAIN + 3 : PLAIN + 6]
     p += dt * v
     e = z - p
-    p += 0.5 * e
-    v += 0.15 / dt * e
+    quick = (e * e).sum() > (_STRAYED * c.noise) ** 2
+    p += (0.7 if quick else 0.3) * e
+    v += (0.4 if quick else 0.06) / dt * e
 
 
 @compiled
@@ -166,7 +168,7 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
         s[PLAIN : PLAIN + 3] = place
         s[OFFSET:TEMPLATE] = place
     else:
-        track(s, place, dt)
+        track(c, s, place, dt)
     row = rows[int(s[FRAMES]) % RECORD]
     row[0] = time
     row[1:] = place
@@ -184,7 +186,7 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     b = s[OFFSET:TEMPLATE]
     e = place - b - value
     square = (e * e).sum()
-    s[MISFIT] += 0.35 * (sqrt(square) - s[MISFIT])
+    s[MISFIT] += 0.5 * (sqrt(square) - s[MISFIT])
     s[POWER] += dt * (square - s[POWER])
     if s[MISFIT] > c.alarm:
         s[ALARM] = 1.0

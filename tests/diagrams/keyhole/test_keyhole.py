@@ -137,11 +137,21 @@ def test_replay_holds_the_organ():
             "tube_task.standoff=0.03",
             "tube_task.standoff=0.03 m: expected >= instrument.gap",
         ),
+        ("robot.p_WP=[0.0, 0.0, 0.05]", "0.03 to 0.2 m inside the trocar"),
+        ("robot.p_WP=[0.2, 0.0, -0.06]", "40 deg at most off its vertical"),
+        ("entry.p_WE=[0.0, 0.0, 0.0]", "m from the trocar, not 0.000"),
+        ("entry.p_WE=[0.0, 0.0, 0.1]", "not 180; no trocar at this height"),
+        ("sensor_zero.period=0.01", "sensor_zero.period"),
+        ("joints.roll=9", "joints.roll=9.0 rad: expected >= 0 and <= 4"),
         ("joints.period=0.01", "expected joints.period=0.01 s, shared by both"),
         ("organ_motion.recording=nowhere.csv", "nowhere.csv"),
         (
             "task=resect organ_motion.lag=0.5",
             "operation.clearance=0.00015 m: expected >= .* tilt the tube by .* deg",
+        ),
+        (
+            "task=resect organ_motion.breathing=[0.03, 0.0, 0.0]",
+            "tilt the tube by 20.5 deg, which the snake cannot make up for",
         ),
         (
             "task=resect operation.clearance=5e-05",

@@ -19,7 +19,12 @@ from systems.common.signals import ToolMotion
 from systems.keyhole.phases import Phases
 from systems.keyhole.signals import Phase, SnakeStatus, TubePose, TubeStatus
 from systems.keyhole.snake_load import weight_of
-from systems.keyhole.snake_task import SnakeTask, body_deviation, in_channel
+from systems.keyhole.snake_task import (
+    SnakeTask,
+    SnakeTaskParams,
+    body_deviation,
+    in_channel,
+)
 from systems.keyhole.tube_location import TubeLocation
 from systems.keyhole.tube_task import TubeTask, TubeTaskParams
 from systems.sensing.organ_estimator import OrganMotion
@@ -133,14 +138,28 @@ def test_the_body_leaves_its_plan_as_the_tube_does():
 
 def test_a_stop_draws_the_tool_back():
     played = Played()
-    played.play(Phases.RESECT, played.dut.time / 2)
+    before, _ = played.play(Phases.RESECT, played.dut.time / 2)
     status, _ = played.play(Phases.STOPPED, 0.2)
     assert status.retreat == 1.0
     clock = status.clock
+    assert clock == pytest.approx(before.clock - SnakeTaskParams().retreat, abs=0.02)
     status, _ = played.play(Phases.STOPPED, 2.0)
     assert status.clock == clock
     status, _ = played.play(Phases.RETRACT, 40.0)
     assert status.out == 0.0 and status.retreat == 0.0
+
+
+def test_an_alarm_is_not_waited_for_by_a_phase():
+    """The tool loses its power and turns back while the phase is still RESECT."""
+    played = Played()
+    cutting = played.dut.GetOutputPort("cutting")
+    before, _ = played.play(Phases.RESECT, played.dut.time / 2)
+    assert cutting.Eval(played.context)[0] == 1.0
+    alarm = list(OrganMotion._fields).index("alarm") - len(OrganMotion._fields)
+    played.organ[alarm] = 1.0
+    status, _ = played.play(Phases.RESECT, 0.2)
+    assert cutting.Eval(played.context)[0] == 0.0
+    assert status.retreat == 1.0 and status.clock < before.clock
 
 
 def test_the_tube_follows_its_station():

@@ -137,6 +137,18 @@ def test_the_pivot_keeps_within_the_wrists_limits():
     assert max(places) < 0.0225
 
 
+def test_a_pivot_that_slides_follows_along_the_shaft_at_once():
+    """And does not turn it: the tip stands below."""
+    for slides in (True, False):
+        dut = law(slides=slides)
+        first = steps(dut, 2, p_WI=(0.0, 0.0, 0.0))
+        after = dut.step(first, p_WI=(0.0, 0.0, 0.04))
+        assert (abs(pivot(after)[2] - 0.04) < 1e-9) == slides
+        still = (0.0, 0.0, 0.0)
+        turned = np.subtract(dut.pose(after, still).u, dut.pose(first, still).u)
+        assert np.linalg.norm(turned) < 1e-9
+
+
 def test_over_the_force_limit_the_task_freezes_and_the_pivot_does_not():
     dut = law()
     state = steps(dut, 30, f=(4.9, 0.0, 0.0))

@@ -68,6 +68,16 @@ def test_nothing_stands_out_between_the_checks(planned):
         assert hits == 0, f"on the way to posture {index + 1}"
 
 
+def test_a_tool_without_power_frees_nothing(planned):
+    session, _ = planned
+    carving = Carving(session.volume, session.params)
+    deep = int(np.argmax(session.postures[:, 0]))
+    ends = session.postures[deep - 1 : deep + 1]
+    tumour, healthy, _, _, way = carving.move(0, *ends, 1e-4, cutting=False)
+    assert (tumour, healthy) == (0, 0) and way > 0.0
+    assert sum(carving.move(1, *ends, 1e-4)[:2]) > 0
+
+
 def digest() -> str:
     """Of a whole plan, on voxels of 2 mm: reach with reasons, postures, space."""
     session = ball_session(2e-3)
