@@ -61,7 +61,7 @@ def course(run: Any) -> Figure:
             time, tool[:, axis], color=COLORS[color], lw=0.6, label="xyz"[axis]
         )
     places[2].set(ylabel="tool in E [mm]")
-    places[2].legend(ncols=3, loc="upper right", fontsize=7)
+    places[2].legend(ncols=3, loc="lower center", fontsize=7)
     if rows == 4:
         share = run.tissue.removed.tumour / run.case.session.volume.tumour_volume
         places[3].plot(time, 100 * share, color=COLORS["robot"])

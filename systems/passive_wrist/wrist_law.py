@@ -243,7 +243,8 @@ def _move_pivot(
     dt = c.period
     fastest, hardest = c.wrist_speed * ratio, c.wrist_acceleration * ratio
     error = sub(target, xyz(s, PIVOT))
-    if c.slides:
+    probing = c.probe and s[DONE] == 0.0  # its depths are not to be followed so fast
+    if c.slides and not probing:
         u = unit(sub(xyz(s, TIP), xyz(s, PIVOT)))
         _put(s, PIVOT, along(xyz(s, PIVOT), dot(error, u), u))
         error, velocity = across(error, u), across(velocity, u)

@@ -140,7 +140,7 @@ def test_the_pivot_keeps_within_the_wrists_limits():
 def test_a_pivot_that_slides_follows_along_the_shaft_at_once():
     """And does not turn it: the tip stands below."""
     for slides in (True, False):
-        dut = law(slides=slides)
+        dut = law(slides=slides, probe=False)
         first = steps(dut, 2, p_WI=(0.0, 0.0, 0.0))
         after = dut.step(first, p_WI=(0.0, 0.0, 0.04))
         assert (abs(pivot(after)[2] - 0.04) < 1e-9) == slides
