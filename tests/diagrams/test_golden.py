@@ -7,7 +7,7 @@ from tests.golden import differences, figures, golden
 GOLDEN = golden()
 LONG = {
     *("resect_auto_large", "resect_auto_small", "resect_paper", "resect_refused"),
-    "snake_wire_break",
+    *("gauze_breathing_real", "snake_wire_break"),
 }
 """Rows that no other test needs."""
 

@@ -150,6 +150,7 @@ def test_settled_and_last_above():
     assert last_above(t, np.array([0.0, 9.0, 3.0, 1.0, 0.0]), 2.0) == 3.0
 
 
+@pytest.mark.study
 def test_a_late_sensor_costs_little_when_force_and_pose_belong_together():
     figures = run("pwe_breathing", "tool_wrench.delay=2").metrics
     assert figures["rms_lateral_force"] < 0.15
