@@ -21,8 +21,6 @@ import tempfile
 import time
 from typing import Any
 
-import yaml
-
 from diagrams.common.metrics import WALL_CLOCK
 
 SMALL = ["spacing=0.001", "reach_effort=0.25", "planner.target=0.6"]
@@ -54,6 +52,11 @@ def steady(metrics: dict[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in metrics.items() if k not in WALL_CLOCK | RESUMED}
 
 
+def newer(path: Path, other: Path) -> bool:
+    """Whether a file was written after another."""
+    return path.stat().st_mtime_ns > other.stat().st_mtime_ns
+
+
 def faults_of(out: Path) -> list[str]:
     """What is wrong with the results in a folder."""
     found = []
@@ -68,13 +71,11 @@ def faults_of(out: Path) -> list[str]:
             rows = list(csv.reader(path.open()))
             if len({len(row) for row in rows}) != 1:
                 found.append("signals.csv is cut off")
-    told, figures = out / "scenario.yaml", out / "metrics.json"
-    if figures.exists() and not told.exists():
-        found.append("results of the run before are left")
-    elif figures.exists():
-        seeds = {yaml.safe_load(path.read_text())["seed"] for path in (told, figures)}
-        if len(seeds) > 1:
-            found.append("two runs are mixed")
+    told = out / "scenario.yaml"  # a run writes it first
+    others = [out / "metrics.json", *out.glob("*.html"), *out.glob("*.png")]
+    for path in others:
+        if path.exists() and not (told.exists() and newer(path, told)):
+            found.append(f"{path.name} is of the run before")
     return found
 
 

@@ -1,7 +1,8 @@
 """Damaged files of our own: a digest tells, and nonsense with a digest is refused.
 
-Flips and cuts of sessions, executions, reach files and recordings: 200 each in the
-suite, 2,000 as a study. Masks have theirs in `tests/plants/tissue/test_mask_fuzz.py`.
+Flips and cuts of sessions, executions, files of reach and search, and recordings: 200
+each in the suite, 2,000 as a study. Masks have theirs in
+`tests/plants/tissue/test_mask_fuzz.py`.
 """
 
 import io
@@ -17,8 +18,10 @@ from plants.tissue.execution import Execution, load_execution, save_execution
 from plants.tissue.labels import TUMOUR
 from plants.tissue.space import SOLID
 from systems.common.archive import MAGIC, write_archive
+from systems.resection.planning.draws import new_draws
 from systems.resection.planning.procedure import Procedure
 from systems.resection.planning.reach import Reach, load_reach, save_reach
+from systems.resection.planning.search import Search, load_search, save_search
 from systems.resection.planning.session import load_session
 from tests.ball import ball_session
 
@@ -45,6 +48,9 @@ def whole(tmp_path_factory):
     x, parent = session.tree.x[1 : n + 1], session.tree.parent[1 : n + 1]
     reach = Reach(mask, float(fraction), 1.0, n, [], x, parent, 1)
     save_reach(folder / "reach", reach, session, 1, 1.0)
+    going = Search(session.thought(), new_draws(1), 0.02)
+    going.step()
+    save_search(folder / "search", going, "key")
     times = np.arange(50) / 30
     save_recording(folder / "recording", times, np.outer(times, [0.01, 0.0, -0.1]))
     readers = {
@@ -52,6 +58,7 @@ def whole(tmp_path_factory):
         "execution": lambda path: load_execution(path, session.postures, shape),
         "reach": lambda path: load_reach(path, session, 1, 1.0) or refuse(),
         "recording": load_recording,
+        "search": lambda path: load_search(path, going, "key") or True,
     }
     for name, read in readers.items():
         assert read(folder / name) is not None
@@ -92,7 +99,9 @@ def count_accepted(whole, kind: str, cases: int, path: Path) -> int:
     return accepted
 
 
-@pytest.mark.parametrize("kind", ["session", "execution", "reach", "recording"])
+@pytest.mark.parametrize(
+    "kind", ["session", "execution", "reach", "search", "recording"]
+)
 @pytest.mark.parametrize("cases", [200, pytest.param(2000, marks=pytest.mark.study)])
 def test_nothing_damaged_is_taken_for_whole(whole, kind, cases, tmp_path):
     accepted = count_accepted(whole, kind, cases, tmp_path / kind)

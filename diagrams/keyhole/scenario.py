@@ -236,7 +236,8 @@ class KeyholeScenario(Scenario, WristSettings):
             circle_postures(self)
         if self.others:
             for holds, key, expected in tool_rules(self.surgeon):
-                yield holds, f"theatre.{key}", expected
+                ours = key if key == "duration" else f"theatre.{key}"
+                yield holds, ours, expected
         if self.organ_motion.recording:
             load_recording(self.organ_motion.recording)
 
@@ -327,17 +328,17 @@ def reach_rules(scenario: KeyholeScenario) -> Rules:
     begins = limits.min_insertion <= inside <= limits.max_insertion and upright
     yield begins, "robot.p_WP", told
     depth = math.dist(scenario.entry.p_WE, scenario.robot.p_WG)
-    tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
     low = limits.min_insertion + scenario.tube_task.standoff
     high = limits.max_insertion + tube.gap
+    near = low <= depth <= high
+    told = f"it {low:.3f} to {high:.3f} m from the trocar, not {depth:.3f}; "
+    yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
+    tilt = math.acos(max(-1.0, min(1.0, -scenario.axis[2])))
+    near = tilt <= limits.max_tilt
     told = (
         f"it within {math.degrees(limits.max_tilt):.0f} deg of the trocar's vertical, "
         f"not {math.degrees(tilt):.0f}; "
     )
-    near = tilt <= limits.max_tilt
-    yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
-    near = low <= depth <= high
-    told = f"it {low:.3f} to {high:.3f} m from the trocar, not {depth:.3f}; "
     yield near, "entry.p_WE", "" if near else told + better_trocars(scenario)
     least = depth - tube.gap + 0.02 + tube.mount_length
     told = f">= {least:.3f}: the tube is too short, its mount would meet the trocar"

@@ -165,6 +165,18 @@ class Block(LeafSystem):
         producer = ValueProducer(allocate=lambda: AbstractValue.Make([]), calc=store)
         return self.DeclareCacheEntry(name, producer, prerequisites)
 
+    def finite_or_kept(self, context: Any, group: int, new: Any) -> np.ndarray:
+        """The next value of a group of discrete state: it stays if `new` is not finite.
+
+        For what an input says at an instant and a step uses at the next: so a block
+        may read what is made of its own output.
+        """
+        value = np.array(new, float)
+        if np.isfinite(value).all():
+            return value
+        kept: np.ndarray = context.get_discrete_state(group).value().copy()
+        return kept
+
     def update_every(
         self, period: float, update: Callable[[Any], Numbers | Sequence[Any]]
     ) -> None:

@@ -243,7 +243,6 @@ class SensorZeroing(StepBlock):
     def _calc_update(self, context: Any) -> list[np.ndarray]:
         told = view(Fulcrum, self._estimate.Eval(context))
         sure = float(told.phase == BREATHING)
-        known = np.array([*told.p, told.stiffness, told.rate, sure])
-        if not np.isfinite(known).all():
-            known = context.get_discrete_state(1).value().copy()
-        return [self._next.Eval(context)[:MEMORY], known]
+        known = [*told.p, told.stiffness, told.rate, sure]
+        after = self._next.Eval(context)[:MEMORY]
+        return [after, self.finite_or_kept(context, 1, known)]

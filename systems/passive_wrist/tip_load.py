@@ -278,7 +278,5 @@ class TipLoad(StepBlock):
 
     def _calc_update(self, context: Any) -> list[np.ndarray]:
         told = view(Fulcrum, self._estimate.Eval(context))
-        known = np.array([*told.p, told.sigma_along])
-        if not np.isfinite(known).all():
-            known = context.get_discrete_state(1).value().copy()
+        known = self.finite_or_kept(context, 1, [*told.p, told.sigma_along])
         return [self._next.Eval(context)[:_MEMORY], known]

@@ -9,6 +9,7 @@ from tests.benchmarks import (
     gauze_speed,
     hands,
     kinematic_scenes,
+    minutes,
     monitor_sweep,
     organ_suite,
     resection_speed,
@@ -33,6 +34,7 @@ BENCHMARKS = {
     "wrist-step": wrist_step,
     "wrist": wrist_sweep,
     "monitor": monitor_sweep,
+    "minutes": minutes,
 }
 """Name and module; each module's `report(seed, scenes)` returns its text."""
 

@@ -11,7 +11,6 @@ be reached. It ends when steps hardly gain anything; a longer search finds littl
 
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 import hashlib
 from pathlib import Path
@@ -36,7 +35,7 @@ from systems.common.archive import (
 from systems.resection.planning.draws import Draws, new_draws
 from systems.resection.planning.entry import PILOT, entry_pass
 from systems.resection.planning.growth import tilted, tool_posture
-from systems.resection.planning.search import Search, opening
+from systems.resection.planning.search import opening, search
 from systems.resection.planning.session import Session
 
 FORMAT = 2
@@ -44,9 +43,6 @@ FORMAT = 2
 
 PITCH = 2e-3
 """Of the entry in thought, in m."""
-
-PAUSE = 5.0
-"""Between two times that a search is saved, in s; what is found is the same."""
 
 LEAST_LUMP = 2e-9
 """Volume in m3 of the smallest part that is told."""
@@ -126,15 +122,8 @@ def find_reach(
     for bend in (PILOT, session.params.max_bend):
         scratch.commit(entry_pass(scratch, bend, PITCH, "entry"))
     draws = new_draws(seed)
-    going, key = Search(scratch, draws, effort), f"{anew} {_key(session, seed, effort)}"
-    _go_on(going, file, key)
-    saved = start
-    while not going.ended:
-        going.step()
-        progress(going.share)
-        if file and perf_counter() - saved > PAUSE:
-            write_archive(file, {"format": FORMAT, "key": key}, going.arrays())
-            saved = perf_counter()
+    key = f"{anew} {_key(session, seed, effort)}"
+    search(scratch, draws, effort, progress, file, key)
     mask = volume.resected
     fraction = int(mask.sum()) / int((volume.labels == TUMOUR).sum())
     lumps = []
@@ -152,16 +141,6 @@ def find_reach(
         scratch.tree.parent[first:nodes].copy(),
         first,
     )
-
-
-def _go_on(going: Search, file: Path | None, key: str) -> None:
-    """Goes on from where a search of this kind was cut off, if there is one."""
-    if file is None or not file.exists():
-        return
-    with suppress(ValueError):  # otherwise from its beginning
-        meta, arrays = read_archive(file, "search", FORMAT)
-        if meta["key"] == key:
-            going.resume(arrays)
 
 
 def save_reach(

@@ -5,6 +5,9 @@ never been cut off.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -14,11 +17,22 @@ from scipy import ndimage
 from plants.tissue.labels import TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.volume import Volume
-from systems.common.archive import check_arrays
+from systems.common.archive import (
+    check_arrays,
+    read_archive,
+    sensible,
+    write_archive,
+)
 from systems.resection.planning.draws import WORDS, Draws
 from systems.resection.planning.growth import grow
 from systems.resection.planning.session import Session
 from systems.resection.planning.tree import tree_of
+
+FORMAT = 1
+"""Of the file of a search."""
+
+PAUSE = 5.0
+"""Between two times that it is saved, in s; what is found is the same."""
 
 ROUND = 20_000
 """Attempts between two looks at what is left, at effort 1."""
@@ -54,11 +68,8 @@ class Search:
         self.tries = np.zeros(len(self.wanted), np.int32)
         self.gone = [int(np.count_nonzero(volume.resected))]
         self._seats = seats_of(volume, radius)
-        self._attempts, self._weary = (
-            max(1, round(ROUND * effort)),
-            round(WEARY * effort),
-        )
-        self._weary = max(1, self._weary)
+        self._attempts = max(1, round(ROUND * effort))
+        self._weary = max(1, round(WEARY * effort))
         self._total = int(np.count_nonzero(volume.labels == TUMOUR))
 
     @property
@@ -108,12 +119,13 @@ class Search:
         volume, a = self.session.volume, arrays
         check_arrays(a, KINDS | {"tau": ("i4", volume.tau.shape)})
         nodes = len(a["x"])
-        for name, least, end in (
-            *(("parent", -1, nodes), ("route", 0, nodes), ("home", 0, nodes)),
-            *(("wanted", 0, volume.tau.size), ("used", 0, WORDS + 1)),
-        ):
-            if ((a[name] < least) | (a[name] >= end)).any():
-                raise ValueError(f"{name}: expected from {least} to {end - 1}")
+        ends = {"route": nodes, "home": nodes, "used": WORDS + 1}
+        ends |= {"wanted": volume.tau.size, "gone": volume.tau.size + 1}
+        for name, end in ends.items():
+            if not a[name].size or ((a[name] < 0) | (a[name] >= end)).any():
+                raise ValueError(f"{name}: expected from 0 to {end - 1}")
+        if ((a["parent"] < -1) | (a["parent"] >= np.arange(nodes))).any():
+            raise ValueError("parent: expected a node before, or -1")
         tree = a["x"], a["parent"], a["depth"], a["tip"], a["route"]
         self.session.tree = tree_of(*tree, int(a["home"][0]), ROOM, ROOM)
         volume.tau[...] = a["tau"]
@@ -137,6 +149,8 @@ def search(
     draws: Draws,
     effort: float = 1.0,
     progress: Callable[[float], None] = lambda share: None,
+    file: Path | None = None,
+    key: str = "",
 ) -> None:
     """Grows a session's tree, in place, until steps gain hardly anything.
 
@@ -145,11 +159,38 @@ def search(
         draws: Where random numbers come from.
         effort: Scales the search.
         progress: Called with the share of the tumour that is reached.
+        file: Where it is saved every few seconds, and goes on from if it was cut off.
+        key: Of what is searched: a file with another is not gone on from.
     """
     going = Search(session, draws, effort)
+    if file and file.exists():
+        with suppress(ValueError):  # otherwise from its beginning
+            load_search(file, going, key)
+    saved = perf_counter()
     while not going.ended:
         going.step()
         progress(going.share)
+        if file and perf_counter() - saved > PAUSE:
+            save_search(file, going, key)
+            saved = perf_counter()
+
+
+def save_search(path: Path, going: Search, key: str) -> None:
+    """Writes where a search stands."""
+    write_archive(path, {"format": FORMAT, "key": key}, going.arrays())
+
+
+def load_search(path: Path, going: Search, key: str) -> None:
+    """Goes on from a file.
+
+    Raises:
+        ValueError: If it is damaged, makes no sense, or is of another search.
+    """
+    meta, arrays = read_archive(path, "search", FORMAT)
+    with sensible(path, "search"):
+        if meta["key"] != key:
+            raise ValueError("it is of another tumour, robot, seed or effort")
+        going.resume(arrays)
 
 
 def coverable(volume: Volume, radius: float) -> NDArray[np.bool_]:

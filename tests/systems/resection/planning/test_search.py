@@ -5,7 +5,7 @@ import pytest
 
 from systems.resection.planning.draws import new_draws
 from systems.resection.planning.procedure import Procedure
-from systems.resection.planning.search import Search
+from systems.resection.planning.search import Search, load_search, save_search
 from tests.ball import ball_session
 
 ENTRY = Procedure("entry", length=0.016, radius=0.005, pitch=1e-3, name="entry")
@@ -37,9 +37,10 @@ def test_a_search_cut_off_ends_with_the_same():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("parent", 10**6, "parent: expected from -1"),
+        ("parent", 10**6, "parent: expected a node before"),
         ("wanted", -5, "wanted: expected from 0"),
         ("home", 10**6, "home"),
+        ("gone", -1, "gone: expected from 0"),
         ("x", np.nan, "not finite"),
     ],
 )
@@ -49,3 +50,14 @@ def test_what_makes_no_sense_is_refused(name, value, message):
     told[name].reshape(-1)[-1] = value
     with pytest.raises(ValueError, match=message):
         search.resume(told)
+
+
+def test_a_file_of_another_search_is_not_gone_on_from(tmp_path):
+    first = begun()
+    first.step()
+    save_search(tmp_path / "search", first, "mine")
+    again = begun()
+    with pytest.raises(ValueError, match="of another tumour, robot, seed or effort"):
+        load_search(tmp_path / "search", again, "yours")
+    load_search(tmp_path / "search", again, "mine")
+    assert again.gone == first.gone
