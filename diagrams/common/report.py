@@ -77,7 +77,7 @@ def figures_table(figures: dict[str, Any]) -> str:
         [key, in_words(key, value), FIGURES[key].meaning if key in FIGURES else ""]
         for key, value in figures.items()
     ]
-    return rows(["figure", "", ""], lines)
+    return rows(["figure", "value", "what it is"], lines)
 
 
 def set_keys(scenario: Any) -> Iterator[list[str]]:

@@ -11,6 +11,10 @@ from diagrams.gauze.tools import CAMERA, OBSTACLE, TARGET, gap, logged
 MM = 1e3
 
 
+FARTHEST = 40.0
+"""Clearance that is drawn [mm]."""
+
+
 def clearance(run: Any) -> Figure:
     """Clearances to all tools over time, and what the constraint and the bypass do."""
     figure = new_figure(7.0, 5.2)
@@ -21,13 +25,15 @@ def clearance(run: Any) -> Figure:
         (TARGET, "S (touched at the hand-over)"),
         (CAMERA, "endoscope"),
     ):
-        upper.plot(time, gap(run, who) * MM, color=COLORS[who], label=name)
+        far = gap(run, who) * MM
+        if far.min() < FARTHEST:
+            upper.plot(time, far, color=COLORS[who], label=name)
     upper.axhline(0.0, color="k", lw=0.8)
-    upper.set(ylabel="clearance [mm]", ylim=(-6.0, 40.0), xlim=(time[0], time[-1]))
+    upper.set(ylabel="clearance [mm]", ylim=(-6.0, FARTHEST), xlim=(time[0], time[-1]))
     upper.legend(ncols=3, loc="upper right")
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     status = run.planner.clearance
-    lower.plot(time, status.change * MM, color=COLORS["robot"], label="changed by")
+    lower.plot(time, status.change * MM, color=COLORS["robot"], label="changed")
     fails = (status.near > 0.5) & (status.condition < 0.5)
     marks = [
         ("dodging", status.dodge > 0.5, COLORS["accent"]),
@@ -36,11 +42,11 @@ def clearance(run: Any) -> Figure:
     if "planner.way" in run.logged:
         marks.append(("waiting", run.planner.way.waiting > 0.5, COLORS["muted"]))
     top = max(10.0, 1.05 * float(status.change.max()) * MM)
-    for name, flags, color in marks:
+    for name, flags, color in [one for one in marks if one[1].any()]:
         lower.fill_between(
             time, 0.0, top, where=flags, color=color, alpha=0.3, lw=0, label=name
         )
-    lower.set(xlabel="time [s]", ylabel="tip velocity [mm/s]", ylim=(0.0, top))
+    lower.set(xlabel="time [s]", ylabel="change of velocity [mm/s]", ylim=(0.0, top))
     lower.legend(ncols=2, loc="upper right")
     return figure
 
