@@ -28,9 +28,6 @@ from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
 from numba.core.event import Listener, install_listener
 import numpy as np
 
-# Scalar code is as fast as at LLVM's third level, and compiled in 5/6 of the time.
-numba.config.OPT = type(numba.config.OPT)(1)
-
 type Numbers = Sequence[float] | np.ndarray
 """An array or a tuple of floats."""
 
