@@ -5,11 +5,16 @@ rate goes from 0.25 to 0.30 Hz. Half an hour takes three minutes of processor a 
 `python -m tests.benchmarks minutes --seed 1 --scenes 1800`.
 """
 
+from diagrams.common.figures import in_words
 from diagrams.common.run import simulate
 from diagrams.studies import load_scenario
 
 LAGS = {"antiphase": 0.5, "in phase": 0.0}
 """Of the organ behind the wall, in breaths."""
+FIGURES = (
+    *("rms_lateral_force", "max_lateral_force_3s", "rms_fulcrum_error"),
+    *("rms_tool_error", "estimates_refused"),
+)
 
 
 def row(wave: str, lag: float, seed: int, duration: float) -> str:
@@ -21,13 +26,8 @@ def row(wave: str, lag: float, seed: int, duration: float) -> str:
     told = [f"wall_motion.irregular.{key}={value}" for key, value in irregular.items()]
     told += [f"wall_motion.wave={wave}", f"organ_motion.lag={lag}"]
     run = simulate(load_scenario("keyhole_circle", told, seed, duration))
-    m = run.metrics
-    return (
-        f"force {m['rms_lateral_force']:.3f} N rms, {m['max_lateral_force_3s']:.2f} "
-        f"most; fulcrum {1e3 * m['rms_fulcrum_error']:.3f} mm rms; tool "
-        f"{1e3 * m['rms_tool_error']:.3f} mm rms; refused {m['estimates_refused']}"
-        f"{'; broke off: ' + run.error if run.error else ''}"
-    )
+    said = [f"{key} {in_words(key, run.metrics[key])}" for key in FIGURES]
+    return ", ".join(said + ([f"broke off: {run.error}"] if run.error else []))
 
 
 def report(seed: int, scenes: int) -> str:
