@@ -1,6 +1,6 @@
 """The systems that scenarios can run, and scenarios loaded by their names."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from diagrams.common.tree import (
     apply_override,
     fit,
     make,
+    put,
     read_tree,
     require,
     settle,
@@ -71,7 +72,7 @@ def load_scenario(
 
 def scenario_of(
     tree: dict[str, Any],
-    overrides: Sequence[str] = (),
+    overrides: Sequence[str] | Mapping[str, Any] = (),
     seed: int | None = None,
     duration: float | None = None,
     path: Path = Path("scenario"),
@@ -80,7 +81,7 @@ def scenario_of(
 
     Args:
         tree: Plain data, as `read_tree` gives them.
-        overrides: As for `load_scenario`, as are seed and duration.
+        overrides: As for `load_scenario`, as are seed and duration; or values by key.
         seed: Replaces the scenario's seed.
         duration: Replaces the scenario's duration [s].
         path: Where the data came from: relative names of files begin beside it.
@@ -94,8 +95,12 @@ def scenario_of(
     schema = study.scenario
     study.gather(tree)
     settle(schema, tree, path.parent)
-    for text in overrides:
-        apply_override(tree, text)
+    if isinstance(overrides, Mapping):
+        for key, value in overrides.items():
+            put(tree, key.split("."), value, key)
+    else:
+        for text in overrides:
+            apply_override(tree, text)
     if seed is not None:
         tree["seed"] = seed
     if duration is not None:

@@ -25,8 +25,8 @@ def scenario(job: Job) -> Figures:
     from diagrams.common.run import simulate
     from diagrams.studies import scenario_of
 
-    tree, changed = copy.deepcopy(job["base"]), texts(job["overrides"])
-    run = simulate(scenario_of(tree, changed, job["seed"]))
+    tree = copy.deepcopy(job["base"])
+    run = simulate(scenario_of(tree, job["overrides"], job["seed"]))
     return {k: v for k, v in run.metrics.items() if k not in WALL_CLOCK}
 
 

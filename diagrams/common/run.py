@@ -295,8 +295,9 @@ def advance(
     simulator.Initialize()
     recorder.draw(simulator.get_context())
     station = run.diagram.GetSubsystemByName("station")
+    is_over = run.study.ending(run.case, station)
     time, frame = 0.0, 0
-    while time < duration:
+    while time < run.duration:
         STOPWATCH.look(frame % LOOKS == 0, time if frame else -1.0)
         frame += 1
         time = min(frame * period, duration)
@@ -308,6 +309,8 @@ def advance(
             recorder.draw(simulator.get_context())
         show(time, duration)
         run.study.keep(run.case, station, simulator.get_context(), False)
+        if is_over(simulator.get_context()):
+            run.duration = time
 
 
 def run_scenario(

@@ -59,6 +59,8 @@ class Study:
             for parameters of the plant that change with time.
         keep: Called with case, diagram, root context and whether the run has
             ended, after every frame: saves what must not be lost if it is killed.
+        ending: Makes, for case and diagram, what says after every frame from the root
+            context whether the run is over before its time.
         frame_rate: Frames of the replay per second of it [1/s].
         length: How long a case really runs [s], at most its scenario's duration.
         replay_length: A run longer than this [s] is shown faster.
@@ -82,6 +84,9 @@ class Study:
     controller: str = ""
     adjust: Callable[[Any, Any, Any], None] = lambda case, station, context: None
     keep: Callable[[Any, Any, Any, bool], None] = lambda *now: None
+    ending: Callable[[Any, Any], Callable[[Any], bool]] = lambda case, station: (
+        lambda context: False
+    )
     required: tuple[str, ...] = ("system", "duration")
     integrator: Callable[[Any], SimulatorConfig] = lambda scenario: cenic()
     view: View = field(default_factory=View)

@@ -123,13 +123,25 @@ def apply_override(tree: dict[str, Any], text: str) -> str:
     if not equals or not all(parts):
         raise ScenarioError(f"--set {text!r}: expected KEY.SUB=VALUE")
     parsed = read_yaml(f"value: {told}", f"--set {text!r}: {told!r} is no value")
+    return put(tree, parts, parsed["value"], f"--set {text!r}")
+
+
+def put(tree: dict[str, Any], parts: list[str], value: Any, source: str) -> str:
+    """Puts a value below a key's parts into the tree. Tools are added.
+
+    Returns:
+        The first part.
+
+    Raises:
+        ScenarioError: If a part has no keys below it; names the source.
+    """
     node = tree
     for part in parts[:-1]:
         child = node.setdefault(part, {})
         if not isinstance(child, dict):
-            raise ScenarioError(f"--set {text!r}: {part!r} has no keys below it")
+            raise ScenarioError(f"{source}: {part!r} has no keys below it")
         node = child
-    value, before = parsed["value"], node.get(parts[-1])
+    before = node.get(parts[-1])
     both = parts == [NAMED] and isinstance(value, list) and isinstance(before, list)
     node[parts[-1]] = before + value if both else value
     return parts[0]

@@ -144,6 +144,8 @@ EMULATED = (
     ("tool_navigation.tool", "passive_wrist.tool_wanted"),
     ("passive_wrist.permission", "tool_navigation.permission"),
     ("passive_wrist.permission", "clearance_constraint.permission"),
+    # The probe swings the shaft where it is outside the body.
+    ("tool_navigation.leeway", "passive_wrist.leeway"),
 )
 """Figure 2's passive wrist emulation between the local planner and the arm."""
 

@@ -66,6 +66,14 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     measure_from: float = parameter(
         0.0, "force figures of the wrist start here", "s", least=0.0, most=1e5
     )
+    linger: float = parameter(
+        0.0,
+        "that it goes on after the gauze is there and all hands are at rest; 0: till "
+        "its duration is over",
+        "s",
+        least=0.0,
+        most=1e3,
+    )
     robot: ToolAtStart = part(ToolAtStart)
     tools: list[Tool] = field(default_factory=usual_tools)
     organs: list[Organ] = parameter([], "of the patient", shape=(-1,))

@@ -11,6 +11,7 @@ from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
 from diagrams.gauze import film
 from diagrams.gauze.diagram import make_gauze_diagram
+from diagrams.gauze.ending import ending
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.organs import organ_signals
 from diagrams.gauze.plots import plots
@@ -118,6 +119,7 @@ STUDY = Study(
     decorate=decorate,
     controller="tool_navigation",
     adjust=stiffen,
+    ending=ending,
     companions=companions,
     can_film=film.refuse_without_egl,
     film=film.save_film,

@@ -1,6 +1,7 @@
 """Smooth, thin surfaces turned about the z axis, as meshes to look at."""
 
 from collections.abc import Sequence
+from functools import cache
 import math
 
 from pydrake.common import MemoryFile
@@ -21,6 +22,18 @@ def lathe(
         stretch: Factors along x and y that make the circles ellipses.
         spokes: Number of points of a circle.
     """
+    text = _text(tuple(profile), name, stretch, spokes)
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", f"{name}.obj")), 1.0)
+
+
+@cache
+def _text(
+    profile: tuple[tuple[float, float], ...],
+    name: str,
+    stretch: tuple[float, float],
+    spokes: int,
+) -> str:
+    """The mesh as an OBJ file: the same for every diagram of a process."""
     a, b = stretch
     lines = [f"o {name}"]
     last = len(profile) - 1
@@ -40,5 +53,4 @@ def lathe(
             corners = ((p, p + spokes, q + spokes), (p, q + spokes, q))
             for triangle in corners:
                 lines.append("f " + " ".join(f"{v}//{v}" for v in triangle))
-    text = "\n".join(lines) + "\n"
-    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", f"{name}.obj")), 1.0)
+    return "\n".join(lines) + "\n"

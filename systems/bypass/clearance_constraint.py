@@ -49,6 +49,8 @@ from systems.bypass.distance_rate import (
     distance_rate,
     drifting,
     least_rate,
+    leeway,
+    less,
     outer_rate,
     tip_rates,
 )
@@ -76,6 +78,7 @@ from systems.common.signal import Many, Vector
 from systems.common.signals import (
     CALM,
     FREE,
+    UNHINDERED,
     ClearanceStatus,
     Estimate,
     Guide,
@@ -90,6 +93,7 @@ from systems.common.signals import (
     usable,
 )
 from systems.common.step_block import StepBlock
+from systems.passive_wrist.wall_model import lateral_basis
 
 _TROCAR = 6
 """Numbers that are kept of a trocar."""
@@ -193,7 +197,8 @@ def constrain(
     turning = fastest_sideways(workspace, q, params.turning_speed)
     dodges = np.zeros(len(dodging))
     least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
-    escape, blind = 0.0, 0.0
+    escape, blind, left = 0.0, 0.0, UNHINDERED
+    e, _ = lateral_basis(u)
     near = params.obstacle_speed / params.rate
     inwards, room = borders(workspace, view_cone, g, p)
     # A tip that is outside comes back no faster than it may go at all.
@@ -232,6 +237,7 @@ def constrain(
             driven_time(rate, inwards[:VIEW], room[:VIEW]),
         ):
             dodge = dodges[i] = 1.0
+        left = less(left, leeway(params, rate, tool.safe, e))
         set_row(rows, last, rate.A)
         bounds[last] = least_rate(params, rate, tool.safe, evasion)
         last += 1
@@ -239,6 +245,11 @@ def constrain(
             outer = drifting(outer_rate(g, p, tool, params.outside), v_G, v_GO)
             evasion = greatest_rate(outer.A, u, params.max_speed, turning)
             least = min(least, outer.rho - tool.safe)
+            if outer.rho - tool.safe < near:
+                is_near = 1.0
+                if outer.c > evasion:
+                    holds = 0.0
+            left = less(left, leeway(params, outer, tool.safe, e))
             set_row(rows, last, outer.A)
             bounds[last] = least_rate(params, outer, tool.safe, evasion)
             last += 1
@@ -246,6 +257,7 @@ def constrain(
             for still in tip_rates(g, p, tool):
                 end = drifting(still, v_G, v_GO)
                 evasion = greatest_rate(end.A, u, params.max_speed, turning)
+                left = less(left, leeway(params, end, tool.safe, e))
                 set_row(rows, last, end.A)
                 bounds[last] = least_rate(params, end, tool.safe, evasion)
                 last += 1
@@ -273,9 +285,8 @@ def constrain(
         if missed > _MISSED:
             holds = 0.0
         wanted = v
-    status = ClearanceStatus(
-        least, is_near, holds, dodge, change, missed, escape, blind
-    )
+    told = (least, is_near, holds, dodge, change, missed, escape, blind)
+    status = ClearanceStatus(*told, left.forth, left.back)
     return wanted, dodges, status
 
 

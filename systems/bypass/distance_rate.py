@@ -22,6 +22,7 @@ from systems.common.geometry import (
     unit,
 )
 from systems.common.signal import Vector
+from systems.common.signals import UNHINDERED, Leeway
 
 _PARALLEL = 0.2
 """Sine of the angle below which a tip's own distance is constrained as well."""
@@ -119,6 +120,26 @@ def tip_rates(
     s, rho = closest_on_segment(p_o, g, p)
     n = unit(sub(along(g, s, sub(p, g)), p_o), aside)
     return own, DistanceRate(rho, s, leverage(s, n, u), dot(n, tool.v), n, 1.0)
+
+
+@compiled
+def leeway(params: Any, rate: DistanceRate, safe: float, e: Vector) -> Leeway:
+    """How fast R's fulcrum may move along e and against it, the tip at rest.
+
+    A fulcrum at w e adds (1 - s) w n . e to d rho/dt, which is held as ever.
+    """
+    closing = -(1.0 - rate.s) * dot(rate.n, e)
+    most = max(0.0, params.rate * (rate.rho - safe) - rate.c)
+    fastest = min(UNHINDERED.forth, most / max(abs(closing), 1e-9))
+    if closing > 0.0:
+        return Leeway(fastest, UNHINDERED.back)
+    return Leeway(UNHINDERED.forth, fastest)
+
+
+@compiled
+def less(a: Leeway, b: Leeway) -> Leeway:
+    """What both leave."""
+    return Leeway(min(a.forth, b.forth), min(a.back, b.back))
 
 
 @compiled

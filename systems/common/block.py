@@ -21,11 +21,12 @@ class VectorInput:
     reader must not write into what it gets, nor keep it.
     """
 
-    __slots__ = ("_port", "vector")
+    __slots__ = ("HasValue", "_port", "vector")
 
     def __init__(self, port: Any) -> None:
         self._port = port
         self.vector = port.EvalBasicVector
+        self.HasValue = port.HasValue
 
     def Eval(self, context: Any) -> np.ndarray:
         """The port's value in a context."""

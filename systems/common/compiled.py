@@ -224,6 +224,15 @@ class UserWide(_Stamped, UserWideCacheLocator):
     """One in the user's cache folder, for an installation that is read-only."""
 
 
+@cache
+def _layout(fields: tuple[Any, ...]) -> np.dtype:
+    """The type of a record: one object, by which numba knows it at once.
+
+    Equal ones it compares field by field, at every call.
+    """
+    return np.dtype(list(fields), align=True)
+
+
 def packed(params: Any = None, **more: Any) -> np.ndarray:
     """Parameters as compiled functions take them.
 
@@ -245,7 +254,7 @@ def packed(params: Any = None, **more: Any) -> np.ndarray:
         if array.dtype.kind in "bif" and array.size:
             values[name] = array
     layout = [(name, array.dtype, array.shape) for name, array in values.items()]
-    record = np.zeros(1, np.dtype(layout, align=True))
+    record = np.zeros(1, _layout(tuple(layout)))
     for name, array in values.items():
         record[name] = array
     return record

@@ -109,9 +109,24 @@ class ClearanceStatus(NamedTuple):
         float, Field("1", "1 while a tool leaves the planner no choice, else 0", 0.0)
     ]
     blind: Annotated[float, Field("1", "1 while the view gives way to it", 0.0)]
+    forth: Annotated[float, Field("m/s", "as `Leeway`", 1.0)]
+    back: Annotated[float, Field("m/s", "as `Leeway`", 1.0)]
 
 
-CALM = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+class Leeway(NamedTuple):
+    """How fast R's fulcrum may move across its shaft, the tip at rest.
+
+    Along the first axis of the shaft's lateral basis (`wall_model.lateral_basis`), and
+    against it: no tool is in the way.
+    """
+
+    forth: Annotated[float, Field("m/s", "along it", 1.0)]
+    back: Annotated[float, Field("m/s", "against it", 1.0)]
+
+
+UNHINDERED = Leeway(1.0, 1.0)
+"""That of a shaft which no tool is near: faster than any wrist."""
+CALM = ClearanceStatus(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *UNHINDERED)
 """Of a constraint that sees nothing."""
 
 

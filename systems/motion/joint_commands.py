@@ -4,7 +4,7 @@ Differential inverse kinematics as a quadratic program within joint positions an
 speeds, see `joint_velocity`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import pi, sin
 from typing import Annotated, Any, NamedTuple
@@ -357,12 +357,12 @@ class JointCommands(Block):
         rest = context.get_discrete_state(3).value()
         tool, time = self._tool.Eval(context), context.get_time()
 
-        def told(port: Any, instead: np.ndarray) -> np.ndarray:
-            return port.Eval(context) if port.HasValue(context) else instead
+        def told(port: Any, instead: Callable[[], np.ndarray]) -> np.ndarray:
+            return port.Eval(context) if port.HasValue(context) else instead()
 
-        fulcrum = told(self._fulcrum, view(ToolMotion, tool).tip)
-        measured = told(self._measured, np.concatenate([q, q]))
-        permission = told(self._permission, _FREE)
+        fulcrum = told(self._fulcrum, lambda: view(ToolMotion, tool).tip)
+        measured = told(self._measured, lambda: np.concatenate([q, q]))
+        permission = told(self._permission, lambda: _FREE)
         constants, arm = self._constants, self._arm
         step = self._step(
             constants, arm, q, rest, time, tool, fulcrum, measured, permission

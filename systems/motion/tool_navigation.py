@@ -37,9 +37,11 @@ from systems.common.signal import Field, Many, Vector, example, vector
 from systems.common.signals import (
     CALM,
     FREE,
+    UNHINDERED,
     ClearanceStatus,
     Estimate,
     Guide,
+    Leeway,
     Permission,
     RobotTool,
     ToolMotion,
@@ -294,6 +296,7 @@ def _update(
     params: Any,
     tool: ToolMotion,
     stop_code: StopCode,
+    leeway: Leeway,
     time: float,
     v_R: Velocity,
     guide: Guide,
@@ -303,7 +306,7 @@ def _update(
     view_cone: ViewCone,
     permission: Permission,
     clearance: ClearanceStatus,
-) -> tuple[ToolMotion, StopCode]:
+) -> tuple[ToolMotion, StopCode, Leeway]:
     # The tip has moved on since the last instant.
     p = along(tool.tip, time - tool.time, tool.v)
     escapes = 0.5 < clearance.escape < 2.0
@@ -331,7 +334,8 @@ def _update(
     excess = sub(sideways, limited(sideways, hardest * params.period))
     v = plus(tool.v, sub(change, excess))
     du = over(across(v, u), norm(shaft))
-    return ToolMotion(p, u, v, du, time), StopCode(code)
+    leeway = Leeway(clearance.forth, clearance.back)
+    return ToolMotion(p, u, v, du, time), StopCode(code), leeway
 
 
 class ToolNavigation(StepBlock):
@@ -364,6 +368,8 @@ class ToolNavigation(StepBlock):
     Port ``tool`` emits the commanded `ToolMotion`.
 
     Port ``stop`` emits why the robot stands, a `StopCode`.
+
+    Port ``leeway`` emits the `Leeway` that the constraint left.
     """
 
     def __init__(
@@ -402,6 +408,7 @@ class ToolNavigation(StepBlock):
             {
                 "tool": ToolMotion(tip, u, still, still, 0.0),
                 "stop": StopCode(float(Stop.MOVING)),
+                "leeway": UNHINDERED,
             },
             params.period,
             defaults={"permission": FREE, "clearance": CALM},

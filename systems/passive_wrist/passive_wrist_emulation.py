@@ -21,7 +21,9 @@ import numpy as np
 from systems.common.compiled import compiled
 from systems.common.geometry import xyz
 from systems.common.signals import (
+    UNHINDERED,
     Fulcrum,
+    Leeway,
     MovingPoint,
     Permission,
     Point,
@@ -51,11 +53,13 @@ def _told_step(
     shaft: ShaftMotion,
     wrench: Wrench,
     estimate: Fulcrum,
+    leeway: Leeway,
     seen: MovingPoint,
 ) -> tuple[np.ndarray, ToolMotion, Permission, Point]:
     """The law's state with this instant's inputs, once and only once."""
     if time - state[TIME] >= 0.5 * c.period:
-        state = next_state(c, state, time, wanted, shaft, wrench, estimate, seen)
+        known = (shaft, wrench, estimate, seen, leeway)
+        state = next_state(c, state, time, wanted, *known)
     pivot = Point(xyz(state, PIVOT))
     return state, command(state, wanted), permission(state), pivot
 
@@ -69,9 +73,11 @@ def _step(
     shaft: ShaftMotion,
     wrench: Wrench,
     estimate: Fulcrum,
+    leeway: Leeway,
 ) -> tuple[np.ndarray, ToolMotion, Permission, Point]:
     seen = MovingPoint(estimate.p, estimate.v)
-    return _told_step(c, state, time, wanted, shaft, wrench, estimate, seen)
+    known = (shaft, wrench, estimate, leeway, seen)
+    return _told_step(c, state, time, wanted, *known)
 
 
 class PassiveWristEmulation(StepBlock):
@@ -89,6 +95,9 @@ class PassiveWristEmulation(StepBlock):
     Port ``wrench`` accepts the `Wrench`.
 
     Port ``estimate`` accepts the fulcrum estimator's `Fulcrum`.
+
+    Port ``leeway`` accepts the `Leeway` that other tools leave the probe; all of it
+    without a wire.
 
     Port ``true_fulcrum`` accepts p_WI, a `MovingPoint`; only `known` looks at it, and
     it need not be connected otherwise.
@@ -110,6 +119,7 @@ class PassiveWristEmulation(StepBlock):
             "shaft": ShaftMotion,
             "wrench": Wrench,
             "estimate": Fulcrum,
+            "leeway": Leeway,
         }
         truth = {"true_fulcrum": MovingPoint}
         self.declare_step(
@@ -119,6 +129,7 @@ class PassiveWristEmulation(StepBlock):
             initial(params),
             {"tool": ToolMotion, "permission": Permission, "pivot": Point},
             params.period,
+            defaults={"leeway": UNHINDERED},
         )
         if not told:
             self.signal_in("true_fulcrum", MovingPoint)

@@ -12,7 +12,8 @@ Around it lie three guards, all kept in one small state vector:
 - the *pivot* follows I^ within the wrist's speed and acceleration;
 - the *probe*, a short force-limited sideways move at the start, makes stiffness
   and depth visible (the better the emulation, the less force there is to learn
-  from);
+  from); far above the wall it swings the shaft by a multiple, and keeps clear of
+  other tools there;
 - the *freeze*: over the force limit the task's tip stands still while the pivot
   goes on relaxing the wall.
 """
@@ -40,7 +41,9 @@ from systems.common.geometry import (
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import Vector, finiteness
 from systems.common.signals import (
+    UNHINDERED,
     Fulcrum,
+    Leeway,
     MovingPoint,
     Permission,
     ShaftMotion,
@@ -142,6 +145,8 @@ _PWE, _SPRING, _OFF, _KNOWN = range(len(MODES))
 _LOADED, _SENSOR_LOST = float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST)
 _PROBING = float(Stop.PROBING)
 _STILL = (0.0, 0.0, 0.0)
+_CREEP = 0.2
+"""Share of the probe's speed: with less leeway it turns round."""
 Floats = np.ndarray
 finite_fulcrum = finiteness(Fulcrum)
 finite_motion = finiteness(ToolMotion)
@@ -202,7 +207,7 @@ def _spring(s: Floats, c: Any, shaft: ShaftMotion, f: Vector, valid: bool) -> Ve
 
 @compiled
 def _probe(
-    s: Floats, c: Any, u: Vector, f: Vector, estimate: Fulcrum
+    s: Floats, c: Any, u: Vector, f: Vector, estimate: Fulcrum, leeway: Leeway
 ) -> tuple[Vector, Vector]:
     """The probing move: what it adds to the pivot and to its velocity."""
     dt = c.period
@@ -216,16 +221,23 @@ def _probe(
     speed = min(c.probe_speed, c.probe_force_rate / estimate.stiffness)
     offset, way, move = s[OFFSET], s[WAY], 0.0
     back = -dot(f, e)
+    slow = _CREEP * speed
     if s[PROBE] == PROBE_BACK:
-        move = max(-speed * dt, min(speed * dt, -offset))
+        # A tool that has come into the way back is left time to be evaded.
+        forth = max(slow, min(speed, leeway.forth)) * dt
+        move = max(-max(slow, min(speed, leeway.back)) * dt, min(forth, -offset))
         if offset + move == 0.0:
             s[DONE] = 1.0
-    elif back * way >= c.probe_force or offset * way >= c.probe_travel:
+    elif (
+        back * way >= c.probe_force
+        or offset * way >= c.probe_travel
+        or (leeway.forth if way > 0.0 else leeway.back) < slow
+    ):
         s[DWELL] += dt
         if s[DWELL] > 0.1:
             s[WAY], s[DWELL] = -way, 0.0
     else:
-        move = way * speed * dt
+        move = way * min(speed, leeway.forth if way > 0.0 else leeway.back) * dt
     s[OFFSET] = offset + move
     return scaled(s[OFFSET], e), scaled(move / dt, e)
 
@@ -274,6 +286,7 @@ def next_state(
     wrench: Wrench,
     estimate: Fulcrum,
     seen: MovingPoint,
+    leeway: Leeway = UNHINDERED,
 ) -> Floats:
     """The law's next state; what is not a number counts as a sensor that is silent.
 
@@ -286,6 +299,7 @@ def next_state(
         wrench: What the wall does to it.
         estimate: What the fulcrum estimator says.
         seen: The fulcrum that is believed in: the estimate's, or the true one.
+        leeway: What other tools leave the probe.
     """
     s = old.copy()
     s[TIME] = time
@@ -305,7 +319,7 @@ def next_state(
     elif c.code == _SPRING:
         target, velocity = _spring(s, c, shaft, f, valid), _STILL
     elif c.code == _PWE and c.probe and s[DONE] == 0.0 and valid:
-        more, faster = _probe(s, c, u, f, estimate)
+        more, faster = _probe(s, c, u, f, estimate, leeway)
         target, velocity = plus(target, more), plus(velocity, faster)
     if s[STARTED] == 0.0:
         s[STARTED] = 1.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from diagrams.campaigns.acts import texts
+from diagrams.campaigns.acts import scenario
 from diagrams.campaigns.campaign import base_of, campaign_files, load_campaign
 from diagrams.campaigns.distributions import distribution
 from diagrams.campaigns.tape import Tape
@@ -92,8 +92,16 @@ def test_operations_are_patients_that_can_be():
     base = base_of(campaign)
     for run in range(40):
         job = campaign.job(base, run, "", Tape([campaign.seed, run]))
-        scenario = scenario_of(deepcopy(base), texts(job["overrides"]), job["seed"])
-        points = np.array(scenario.obstacles[0].points)
+        made = scenario_of(deepcopy(base), job["overrides"], job["seed"])
+        points = np.array(made.obstacles[0].points)
         way = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        time = np.diff(scenario.obstacles[0].times)
+        time = np.diff(made.obstacles[0].times)
         assert (1.5 * way / time).max() <= 0.06
+
+
+def test_the_probe_swings_no_shaft_into_one_that_stands():
+    """Outside the body, where run 201 of seed 1 touched."""
+    campaign = load_campaign("operations", seed=1)
+    job = campaign.job(base_of(campaign), 201, "", Tape([1, 201]))
+    job["overrides"]["duration"] = 1.8
+    assert scenario(job)["min_tool_clearance"] > 0.0015

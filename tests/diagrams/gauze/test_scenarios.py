@@ -52,6 +52,17 @@ def tip_error(r: Run) -> np.ndarray:
     return np.linalg.norm(tip - r.target.shaft.tip, axis=1)
 
 
+def test_a_run_may_end_once_the_gauze_is_there():
+    whole, ended = run("gauze_static"), run("gauze_static", "linger=0.5")
+    arrival = whole.metrics["time_to_target"]
+    assert ended.metrics["time_to_target"] == arrival
+    assert arrival + 0.5 <= ended.simulated + 1e-9 < arrival + 0.6
+    assert ended.is_over and not whole.simulated < whole.duration
+    count = len(ended.signals["time"])
+    for name, samples in ended.signals.items():
+        np.testing.assert_array_equal(samples, whole.signals[name][:count])
+
+
 @pytest.mark.parametrize(
     "name", ["static", "dynamic", "push", "recorded", "lost_sight"]
 )

@@ -11,14 +11,15 @@ from systems.bypass.clearance_constraint import (
     ClearanceConstraintParams,
     constrain,
 )
-from systems.bypass.distance_rate import distance_rate
+from systems.bypass.distance_rate import distance_rate, outer_rate
 from systems.bypass.obstacle_tools import Margins
 from systems.bypass.shadow_body import ObstacleTool, pose_distance, read_tool
 from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
 from systems.common.reach_limits import ReachLimits
 from systems.common.signal import example, flat
-from systems.common.signals import FREE, Estimate, Guide, RobotTool, ViewCone
+from systems.common.signals import CALM, FREE, Estimate, Guide, RobotTool, ViewCone
+from systems.passive_wrist.wall_model import lateral_basis
 
 G = (0.0, 0.0, 0.0)
 RECORD = clearance_constraint.constants(ClearanceConstraintParams())[0]
@@ -86,6 +87,20 @@ def test_the_shafts_outside_the_body_are_kept_apart_as_well():
         lows.append(low)
     assert lows[0] > 0.0069
     assert lows[1] < 0.005
+
+
+def test_a_fulcrum_that_moves_as_fast_as_it_may_comes_near_as_gamma_allows():
+    """R turns about its tip; above the wall, where it swings most, O stands."""
+    a, p, dt = (-0.06, 0.03, 0.0), (0.05, 0.005, -0.1), 1e-4
+    o = tool(a, (-0.09, 0.03, -0.1))
+    _, _, status = constrain(
+        RECORD, ROOM, NO_CONE, G, p, G, rows(o), NOT_DODGING, STILL
+    )
+    assert status.forth == 1.0 and 0.0 < status.back < 0.1
+    e, _ = lateral_basis(geometry.unit(geometry.sub(p, G)))
+    g = geometry.scaled(-dt * status.back, e)
+    before, after = (outer_rate(where, p, o, 0.3).rho - o.safe for where in (G, g))
+    assert (after - before) / dt == pytest.approx(-RECORD["rate"] * before, rel=0.01)
 
 
 def test_the_view_gives_way_to_a_tool_and_nothing_else():
@@ -238,7 +253,8 @@ def test_one_of_three_that_is_lost_cannot_be_judged(place):
         dut.GetInputPort("obstacles").FixValue(context, flat(tuple(obstacles)))
         v_R = dut.GetInputPort("v_R").Eval(context)
         np.testing.assert_array_equal(dut.GetOutputPort("v_safe").Eval(context), v_R)
-        assert not np.any(dut.GetOutputPort("status").Eval(context))
+        status = dut.GetOutputPort("status").Eval(context)
+        np.testing.assert_array_equal(status, flat(CALM))
 
 
 def test_margins_follow_the_uncertainty_and_s_is_spared_at_its_tip():
@@ -291,4 +307,5 @@ def test_the_block_lets_pass_what_it_cannot_judge():
     wanted = [0.01, 0.02, 0.03]
     dut.GetInputPort("v_R").FixValue(context, wanted)
     np.testing.assert_allclose(dut.GetOutputPort("v_safe").Eval(context), wanted)
-    assert not np.any(dut.GetOutputPort("status").Eval(context))
+    status = dut.GetOutputPort("status").Eval(context)
+    np.testing.assert_array_equal(status, flat(CALM))

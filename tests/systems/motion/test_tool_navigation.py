@@ -157,7 +157,7 @@ def test_why_the_robot_stands(changes, stop):
     ],
 )
 def test_out_of_a_tools_way_it_is_faster_and_leaves_the_view(changes, goes):
-    calm = ClearanceStatus(0, 1, 1, 0, 0, 0, 0, 0)
+    calm = ClearanceStatus(0, 1, 1, 0, 0, 0, 0, 0, 1, 1)
     hurry = calm._replace(escape=1)
     up = run([0.0, 0.0, 0.2], 0.25, 1.0, clearance=hurry, **changes)[0]
     assert (lengths(up.v).max() > 0.19) == goes

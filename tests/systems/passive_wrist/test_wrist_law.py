@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from systems.common.signals import (
+    UNHINDERED,
     Fulcrum,
+    Leeway,
     MovingPoint,
     ShaftMotion,
     ToolMotion,
@@ -66,6 +68,7 @@ class Law:
         v_WI=STILL,
         stiffness_sigma=0.05,
         sigma_along=1e-3,
+        leeway=UNHINDERED,
     ) -> np.ndarray:
         """One update."""
         time = state[TIME] + DT
@@ -79,6 +82,7 @@ class Law:
             Wrench(f, STILL, valid),
             Fulcrum(p_WI, v_WI, *known),
             MovingPoint(p_WI, v_WI),
+            leeway,
         )
 
     def pose(self, state, v_WP=STILL) -> ToolMotion:
@@ -214,6 +218,35 @@ def test_the_probe_keeps_its_force_and_its_time():
     assert 1.0 <= max(push) < 1.3
     assert len(push) * DT < 1.5 + 0.3
     assert push[-1] < 0.2
+
+
+def probed(leeways) -> np.ndarray:
+    """How far the probe has moved the pivot after each update, in m."""
+    dut = law(probe=True)
+    state, offsets = initial(dut.p), []
+    unsure = {"stiffness_sigma": 0.8, "p_WI": (0.0, 0.0, 0.0)}
+    for leeway in leeways:
+        state = dut.step(state, leeway=leeway, **unsure)
+        offsets.append(pivot(state)[1])
+    return np.array(offsets)
+
+
+def test_the_probe_goes_no_faster_than_other_tools_allow():
+    free = probed([Leeway(1.0, 1.0)] * 30)
+    slow = probed([Leeway(0.01, 1.0)] * 30)
+    assert 0.0 < slow.max() == pytest.approx(30 * DT * 0.01, rel=0.05)
+    assert free.max() > 2.0 * slow.max()
+
+
+def test_the_probe_turns_round_where_a_tool_is_in_its_way():
+    offsets = probed([Leeway(0.0, 1.0)] * 60)
+    assert offsets.max() == 0.0 and offsets.min() < -3e-3
+
+
+def test_the_probe_ends_though_a_tool_has_come_into_its_way_back():
+    offsets = probed([Leeway(1.0, 1.0)] * 150 + [Leeway(1.0, 0.0)] * 400)
+    assert offsets.max() > 5e-3
+    assert offsets[-1] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(
