@@ -6,6 +6,7 @@ from math import cos, pi, sin, sqrt
 from typing import Any
 
 from diagrams.campaigns.tape import Tape
+from plants.abdomen.wall_motion import WallMotionParams
 from systems.common.geometry import (
     along,
     closest_on_segment,
@@ -80,6 +81,8 @@ def _wander(
 
 
 def _between(points: list[Vector]) -> list[Vector]:
+    if len(points) == 1:
+        return points
     return [along(a, k / 8, sub(b, a)) for a, b in pairwise(points) for k in range(9)]
 
 
@@ -90,17 +93,28 @@ def _keeps_off(points: list[Vector], trocar: Vector) -> bool:
     return all(closest_on_segment(origin, trocar, p)[1] > _ROOM for p in tips)
 
 
-def _apart_outside(points: list[Vector], trocar: Vector, way: list[Vector]) -> bool:
+def _apart_outside(
+    points: list[Vector],
+    trocar: Vector,
+    way: list[Vector],
+    g: Vector = (0.0, 0.0, 0.0),
+) -> bool:
     """Whether the tools' parts outside the body stay clear of one another.
 
     The planner knows of what is inside only; whoever holds the tools sees to the rest.
     """
-    g = (0.0, 0.0, 0.0)
     mine = [_outside(g, p) for p in _between(way)]
     theirs = [_outside(trocar, p) for p in _between(points)]
     return all(
         closest_points(g, a, trocar, b).distance > _CLEAR for a in mine for b in theirs
     )
+
+
+def _at_start(patient: dict[str, Any]) -> Vector:
+    """Where the robot's trocar is at the start: the patient has drawn breath."""
+    keys = ("breathing", "phase", "wave")
+    told = {key: patient[f"wall_motion.{key}"] for key in keys}
+    return vector(WallMotionParams(**told).displacement(0.0))
 
 
 def _outside(trocar: Vector, tip: Vector) -> Vector:
@@ -119,7 +133,8 @@ def operation(tape: Tape) -> dict[str, Any]:
     20 mm wrong; in three of ten the tracker loses sight of the hand, in one of ten the
     wall is pushed.
     """
-    g = (0.0, 0.0, 0.0)
+    g, patient = (0.0, 0.0, 0.0), _patient(tape)
+    g_0 = _at_start(patient)
     for pose in tape.tries("pose", _TRIES):
         start, goal = _tip(pose, "start", g, 0.55), _tip(pose, "goal", g, 0.5)
         if norm(sub(goal, start)) >= _LEAST_WAY:
@@ -128,7 +143,8 @@ def operation(tape: Tape) -> dict[str, Any]:
         g_o = _trocar(hand, "trocar", _APART, 0.13)
         times, points = _wander(hand, g_o, [start, goal], 1.0)
         is_clear = (
-            closest_points(g, start, g_o, points[0]).distance > _CLEAR
+            closest_points(g_0, start, g_o, points[0]).distance > _CLEAR
+            and _apart_outside(points[:1], g_o, [start], g_0)
             and closest_points(g, goal, g_o, points[-1]).distance > _CLEAR
         )
         if (
@@ -152,7 +168,7 @@ def operation(tape: Tape) -> dict[str, Any]:
         "obstacle.points": [list(p) for p in points],
         "camera.p_WG": eye,
         "camera.p_WS": [goal[0], goal[1], goal[2]],
-        **_patient(tape),
+        **patient,
     }
 
 

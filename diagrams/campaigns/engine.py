@@ -17,6 +17,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import dask
 from distributed import Client, LocalCluster, as_completed
 from distributed.client import FutureCancelledError
 from distributed.scheduler import KilledWorker
@@ -32,6 +33,14 @@ _AHEAD = 2
 """Batches in flight for each worker."""
 _DEATHS = 20
 """Workers that a batch may outlive."""
+
+_QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.scheduler.active-memory-manager.start": False,
+}
+"""What Dask watches of itself costs a tenth of a core while it waits."""
 
 type Take = Callable[[Job, dict[str, Any]], bool]
 """Takes a job and its answer; says whether to go on."""
@@ -88,6 +97,7 @@ def cluster(workers: int, scheduler: str = "") -> Iterator[Client]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if not scheduler:
         with (
+            dask.config.set(_QUIET),
             frozen(),
             LocalCluster(
                 n_workers=workers,

@@ -42,7 +42,7 @@ class Limits:
     time: float = 600.0
     memory: float = 3e9
     tries: int = 3
-    runs: int = 200
+    runs: int = 100
 
 
 class Child:

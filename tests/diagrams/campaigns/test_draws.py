@@ -99,6 +99,14 @@ def test_operations_are_patients_that_can_be():
         assert (1.5 * way / time).max() <= 0.06
 
 
+def test_no_tools_touch_before_anybody_moves():
+    """Run 757 of seed 1 did: the breath had the robot's trocar aside, and its shaft."""
+    campaign = load_campaign("operations", seed=1)
+    job = campaign.job(base_of(campaign), 757, "", Tape([1, 757]))
+    job["overrides"]["duration"] = 0.1
+    assert scenario(job)["min_tool_clearance"] > 0.005
+
+
 def test_the_probe_swings_no_shaft_into_one_that_stands():
     """Outside the body, where run 201 of seed 1 touched."""
     campaign = load_campaign("operations", seed=1)
