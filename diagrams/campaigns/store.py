@@ -118,7 +118,7 @@ class Store:
             self._write(max(numbers, default=0) + 1, self._table(self._rows))
             self._rows = []
         if len(numbers) > _MOST_PARTS:
-            self.compact()
+            self._join()
 
     def _table(self, rows: list[dict[str, Any]]) -> pa.Table:
         return pa.Table.from_pylist(rows, self._schema)
@@ -157,6 +157,9 @@ class Store:
     def compact(self) -> None:
         """Makes one part of all."""
         self.flush()
+        self._join()
+
+    def _join(self) -> None:
         parts = self._parts()
         if parts and parts != [self._folder / "000000.parquet"]:
             self._write(0, self.read())

@@ -18,7 +18,7 @@ from diagrams.campaigns.engine import cluster
 from diagrams.campaigns.report import write_report
 from diagrams.campaigns.run import Interrupted, run_campaign
 from diagrams.campaigns.splitting import SplittingParams
-from diagrams.campaigns.store import Store, schema
+from diagrams.campaigns.store import HEAD, Store, schema
 from diagrams.common.cli import main
 from diagrams.common.scenario import ScenarioError
 
@@ -60,6 +60,19 @@ def test_a_figure_called_as_a_column_leaves_that_as_it_is():
     columns = schema({"seed": 1, "run": 0.5, "x": 2})
     assert str(columns.field("seed").type) == "int64"
     assert columns.names.count("seed") == columns.names.count("run") == 1
+
+
+def test_many_parts_become_one(tmp_path):
+    store = Store(tmp_path, {"x": 0.5})
+    for run in range(230):
+        store.add(
+            {**dict.fromkeys(HEAD, ""), "run": run, "seed": run}, {"x": 0.1 * run}
+        )
+        store.flush()
+    assert len(list(tmp_path.glob("*.parquet"))) < 103
+    assert store.done() == {(run, "") for run in range(230)}
+    store.compact()
+    assert [row["x"] for row in store.rows()] == [0.1 * run for run in range(230)]
 
 
 def test_number_of_workers_makes_no_difference(undisturbed, tmp_path):
