@@ -36,13 +36,14 @@ class Limits:
         time: Of a run, in s.
         memory: Of the process, in bytes.
         tries: Of a run that takes its process with it.
-        runs: Of a process: then a new one is begun, for memory is not all given back.
+        kept: Memory of a process between runs, in bytes, beyond which a new one is
+            begun, for not all is given back; and half as much again as after its first.
     """
 
     time: float = 600.0
     memory: float = 3e9
     tries: int = 3
-    runs: int = 100
+    kept: float = 6e8
 
 
 class Child:
@@ -58,7 +59,7 @@ class Child:
         self._act, self._limits = act, limits
         self._process: subprocess.Popen[bytes] | None = None
         self._words: Any = None
-        self._done = 0
+        self._most = 0.0
 
     def ask(self, job: Mapping[str, Any]) -> dict[str, Any]:
         """Does a job.
@@ -81,8 +82,9 @@ class Child:
         why, line = self._line(self._limits.time)
         if why is not None:
             return self._buried(why)
-        self._done += 1
-        if self._done >= self._limits.runs:
+        held = _resident(self._process.pid)
+        self._most = self._most or max(self._limits.kept, 1.5 * held)
+        if held > self._most:
             self.close()
         told: dict[str, Any] = json.loads(line)
         return told
@@ -120,7 +122,7 @@ class Child:
             self._process.kill()
             self._process.communicate()
             self._words.close()
-        self._process, self._done = None, 0
+        self._process, self._most = None, 0.0
 
     def _begin(self) -> None:
         if self._process is None:

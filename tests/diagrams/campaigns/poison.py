@@ -6,6 +6,8 @@ import os
 import time
 from typing import Any
 
+_KEPT: list[bytes] = []
+
 
 def act(job: dict[str, Any]) -> dict[str, Any]:
     """Figures of a run's draws alone; `do` says what else it does."""
@@ -29,6 +31,8 @@ def act(job: dict[str, Any]) -> dict[str, Any]:
                 os.abort()
         case "error":
             raise ValueError("no such thing")
+        case "keep":
+            _KEPT.append(b"x" * 100_000_000)
         case "slow":
             time.sleep(0.02)
     digest = hashlib.sha256(repr(sorted(told.items())).encode()).digest()

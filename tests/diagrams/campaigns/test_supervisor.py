@@ -5,7 +5,7 @@ import pytest
 from diagrams.campaigns.supervisor import Child, Limits
 
 ACT = "tests.diagrams.campaigns.poison:act"
-LIMITS = Limits(time=2.0, memory=6e8, tries=2, runs=50)
+LIMITS = Limits(time=2.0, memory=6e8, tries=2, kept=3e8)
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +45,15 @@ def test_errors_and_exits_are_answers(child):
 def test_run_that_dies_once_is_done_again(child, tmp_path):
     told = child.insist(job(do="once", mark=str(tmp_path / "mark"), x=0.125))
     assert told["figures"]["x"] == 0.125
+
+
+def test_a_process_that_keeps_memory_is_begun_anew():
+    child = Child(ACT, LIMITS)
+    try:
+        held = []
+        for _ in range(4):
+            assert "figures" in child.ask(job(do="keep"))
+            held.append(child._process is not None)
+        assert held[0] and not all(held)
+    finally:
+        child.close()
