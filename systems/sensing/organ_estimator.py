@@ -42,6 +42,7 @@ _EACH = 4  # of which frames the search takes one
 _EVERY = 12  # frames between two searches
 _TWICE = 0.5  # residual against amplitude at twice a rate that is half a breath's
 _TROUBLED, _TOO_MUCH = 12.0, 0.3  # s, share of them in alarm: it is learnt anew
+_DIES = 0.4  # s in which the difference of two that were found does
 _STRAYED = 2.5  # times the noise
 _DIFFER = 0.08  # by which breaths may differ until that is learnt
 _LEAST = 0.01
@@ -112,7 +113,8 @@ d differ from the usual; a phase that goes on more evenly than phi."""
 )
 MISFIT = len(SCALARS)  # smoothed, as if it were noise alone (3)
 LOST = MISFIT + 3  # likewise, of the loose breath, as it is (3)
-PLAIN = LOST + 3  # p, v of the plain track (6)
+AWAY = LOST + 3  # of what was said before another breath was found, dies away (3)
+PLAIN = AWAY + 3  # p, v of the plain track (6)
 BREATH = PLAIN + 6  # phi in breaths, omega in 1/s, d, b
 PHI, OMEGA, DEPTH, OFFSET = BREATH, BREATH + 1, BREATH + 2, BREATH + 3
 ORDER = 6
@@ -188,10 +190,14 @@ def go_on(c: Any, s: Floats, x: Floats, P: Floats, dt: float) -> None:
     x[0] += dt * x[1]
     x[1] = s[USUAL] * (1.0 + left * (min(max(x[1] / s[USUAL], _FEWEST), _MOST) - 1.0))
     x[2] = 1.0 + left * (x[2] - 1.0)
-    P[0] += dt * P[1]
-    P[:, 0] += dt * P[:, 1]
-    P[1:3] *= left
-    P[:, 1:3] *= left
+    for j in range(ORDER):
+        P[0, j] += dt * P[1, j]
+    for j in range(ORDER):
+        P[j, 0] += dt * P[j, 1]
+    for k in (1, 2):
+        for j in range(ORDER):
+            P[k, j] *= left
+            P[j, k] *= left
     P[1, 1] += 2.0 * s[USUAL] ** 3 * dt * s[RATES]
     P[2, 2] += 2.0 * s[USUAL] * dt * s[DEPTHS]
     for k in range(3, ORDER):
@@ -209,13 +215,18 @@ def correct(
     """
     value, slope = template_at(T, x[0])
     e = z - x[3:] - x[2] * value
-    plain, dx, h = np.empty(3), np.zeros(ORDER), np.zeros(ORDER)
+    plain, dx = np.empty(3), np.zeros(ORDER)
+    h, Ph = np.zeros(ORDER), np.zeros(ORDER)
     for i in range(3):  # the axes one after the other
         h[:] = 0.0
         h[0], h[2], h[3 + i] = x[2] * slope[i], value[i], 1.0
-        Ph = (P * h).sum(axis=1)
-        power = (h * Ph).sum() + miss**2
-        left = e[i] - (h * dx).sum()
+        power, left = miss**2, e[i]
+        for j in range(ORDER):
+            Ph[j] = 0.0
+            for k in range(ORDER):
+                Ph[j] += P[j, k] * h[k]
+            power += h[j] * Ph[j]
+            left -= h[j] * dx[j]
         plain[i] = left * miss / sqrt(power)
         for j in range(ORDER):
             dx[j] += Ph[j] * left / power
@@ -250,8 +261,8 @@ def is_lost(c: Any, z: Floats, place: Floats, dt: float) -> bool:
     y[0] += dt * y[1]
     e = place - y[3:] - y[2] * template_at(T, y[0])[0]
     y += min(dt / _LOOSE, 1.0) * (x - y)
-    s[LOST:PLAIN] += 0.7 * (e - s[LOST:PLAIN])
-    square = (s[LOST:PLAIN] ** 2).sum()
+    s[LOST:AWAY] += 0.7 * (e - s[LOST:AWAY])
+    square = (s[LOST:AWAY] ** 2).sum()
     k = int((x[0] - floor(x[0])) * BINS)
     if square > (0.7 * c.alarm) ** 2 + _USUALLY**2 * usually[k]:
         return True
@@ -260,6 +271,28 @@ def is_lost(c: Any, z: Floats, place: Floats, dt: float) -> bool:
         j = (k + i) % BINS
         usually[j] += 0.4 * share * (square - usually[j])
     return False
+
+
+@compiled
+def report(z: Floats, time: float) -> Floats:
+    """The elements of `OrganMotion` at a time in s."""
+    s, x, T = z[:TEMPLATE], z[BREATH:LOOSE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
+    out = np.zeros(9)
+    ahead = max(0.0, time - s[TIME])
+    known = s[SHARE] > 0.0
+    out[0:3] = x[3:] + s[AWAY:PLAIN]
+    if s[ALARM] == 1.0:
+        out[0:3] = s[PLAIN : PLAIN + 3] + ahead * s[PLAIN + 3 : PLAIN + 6]
+        out[3:6] = s[PLAIN + 3 : PLAIN + 6]
+    elif known:
+        value, slope = template_at(T, x[0] + x[1] * ahead)
+        share = s[SHARE] * s[SHARE] * (3.0 - 2.0 * s[SHARE]) * x[2]
+        out[0:3] += share * value
+        out[3:6] = share * x[1] * slope
+    out[6] = sqrt(s[POWER]) if known else 1.0
+    out[7] = 1.0 if s[SHARE] == 1.0 and s[ALARM] == 0.0 else 0.0
+    out[8] = s[ALARM]
+    return out
 
 
 @compiled
@@ -284,8 +317,10 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     if first:
         return
     if s[SHARE] == 0.0:  # no template: the mean so far
+        s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
         x[3:] += (place - x[3:]) / min(s[FRAMES], RECORD)
         return
+    s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
     s[SHARE] = min(1.0, s[SHARE] + dt / c.start)
     s[TROUBLE] += min(dt / _TROUBLED, 1.0) * (s[ALARM] - s[TROUBLE])
     if s[ALARM] == 1.0:
@@ -295,8 +330,13 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     s[POWER] += dt * ((e * e).sum() - s[POWER])
     s[MISFIT:LOST] += 0.5 * (plain - s[MISFIT:LOST])
     lost = is_lost(c, z, place, dt) or (s[MISFIT:LOST] ** 2).sum() > c.alarm**2
-    if s[SHARE] == 1.0 and lost:
-        s[ALARM] = 1.0
+    if lost:
+        s[AWAY:PLAIN] = 0.0
+        if s[SHARE] < 1.0:  # it was none
+            s[AWAY:PLAIN] = report(z, time)[:3] - x[3:]
+            s[SHARE] = 0.0
+        else:
+            s[ALARM] = 1.0
         return
     share = s[USUAL] * dt / c.breaths
     value, slope = template_at(T, x[0])
@@ -352,12 +392,14 @@ def search(c: Any, z: Floats) -> None:
             found[3:] = x[3:] + there - d * here
     moved = found[3:] - x[3:]
     if best < c.fits**2 and (moved * moved).sum() < (10.0 * c.fits) ** 2:
+        before = report(z, s[TIME])[:3]
         x[:] = found
         z[LOOSE:SPREAD] = x
         s[EVEN] = x[0]
         unknown(c, x, z[SPREAD:TEMPLATE].reshape((ORDER, ORDER)), s[USUAL])
         s[ALARM], s[POWER] = 0.0, best
-        s[MISFIT:PLAIN] = 0.0
+        s[MISFIT:AWAY] = 0.0
+        s[AWAY:PLAIN] = before - report(z, s[TIME])[:3]
 
 
 @compiled
@@ -408,30 +450,8 @@ def begin(c: Any, z: Floats, rate: float) -> float:
     z[LOOSE:SPREAD] = x
     z[USUALLY:ROWS] = (0.35 * c.alarm) ** 2
     s[POWER], s[ALARM], s[TROUBLE] = c.noise**2, 0.0, 0.0
-    s[MISFIT:PLAIN] = 0.0
+    s[MISFIT:AWAY] = 0.0
     return sqrt(left)
-
-
-@compiled
-def report(z: Floats, time: float) -> Floats:
-    """The elements of `OrganMotion` at a time in s."""
-    s, x, T = z[:TEMPLATE], z[BREATH:LOOSE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
-    out = np.zeros(9)
-    ahead = max(0.0, time - s[TIME])
-    known = s[SHARE] > 0.0
-    out[0:3] = x[3:]
-    if s[ALARM] == 1.0:
-        out[0:3] = s[PLAIN : PLAIN + 3] + ahead * s[PLAIN + 3 : PLAIN + 6]
-        out[3:6] = s[PLAIN + 3 : PLAIN + 6]
-    elif known:
-        value, slope = template_at(T, x[0] + x[1] * ahead)
-        share = s[SHARE] * s[SHARE] * (3.0 - 2.0 * s[SHARE]) * x[2]
-        out[0:3] += share * value
-        out[3:6] = share * x[1] * slope
-    out[6] = sqrt(s[POWER]) if known else 1.0
-    out[7] = 1.0 if s[SHARE] == 1.0 and s[ALARM] == 0.0 else 0.0
-    out[8] = s[ALARM]
-    return out
 
 
 @compiled
@@ -518,7 +538,10 @@ class OrganEstimator(Block):
             fit = twice
         found = z.copy()
         if fit is not None and fit.amplitude > max(self._p.noise, 2.0 * fit.residual):
-            if begin(self._constants[0], found, fit.rate) < self._p.alarm:
+            # Two breaths are soon fitted: they have to fit better than three.
+            most = self._p.alarm * (1.0 if count == RECORD else 0.5)
+            if begin(self._constants[0], found, fit.rate) < most:
+                found[AWAY:PLAIN] += report(z, z[TIME])[:3] - report(found, z[TIME])[:3]
                 z[:] = found
         elif not lost and count == RECORD and entries.std(axis=0).max() < self._p.noise:
             begin(self._constants[0], z, 0.25)
