@@ -76,7 +76,7 @@ class OrganEstimatorParams:
 
     breaths: float = parameter(16.0, "that the template remembers", above=0, most=100)
     offset_walk: float = parameter(
-        2e-4, "of the offset in a second", "m", above=0, most=0.01
+        1e-4, "of the offset in a second", "m", above=0, most=0.01
     )
     miss: float = parameter(
         6e-4, "of a frame along an axis by noise and template", "m", above=0, most=0.01
