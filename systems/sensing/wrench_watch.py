@@ -71,8 +71,7 @@ class WrenchWatchParams:
 
 
 class Watched(NamedTuple):
-    """What is remembered: of the last reading, over the last ones, and of the largest
-    one since it is not believed."""
+    """Of the last reading, over the last ones, and of the largest not believed."""
 
     f: Vector
     p: Vector
@@ -100,7 +99,7 @@ def explained(c: Any, shaft: ShaftMotion, wrench: Wrench) -> bool:
 
 @compiled
 def yielded(c: Any, df: Vector, ds: Vector, f: Vector) -> bool:
-    """Whether an arm that gives way went where the force f points, which fell by that."""
+    """Whether an arm that gives way went along the force f, which fell by that."""
     travel = dot(ds, ds)
     sure = 5.0 * sqrt(0.5 * c.power * travel)
     falls = dot(df, ds) < -max(c.softest * travel, sure)
