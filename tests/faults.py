@@ -62,6 +62,11 @@ def jump(rng: random.Random) -> list[str]:
     return [f"wall_motion.step=[{x},{y},0]", f"wall_motion.step_time={start}"]
 
 
+def moved(rng: random.Random) -> list[str]:
+    """The wall moves 30 mm to any side within 0.3 s."""
+    return [*jump(rng), "wall_motion.step_duration=0.3"]
+
+
 def also(faults: Faults, *more: str) -> Faults:
     """The overrides, and more of them."""
     return lambda rng: [*faults(rng), *more]
@@ -93,6 +98,7 @@ ROWS = {
     ),
     # 15 N of the spring and what its damper adds, before anything can move.
     "wall jumps 30 mm": Row("pwe_step", jump, 25.0, 0.3),
+    "wall moves 30 mm": Row("pwe_step", moved, 10.0, 0.3),
     "tension NaN": Row(
         "snake_circle", also(fault("tension_nan", 1, 3, 1), "duration=5")
     ),

@@ -176,10 +176,9 @@ def simulate(
 def owned(run: Run) -> Run:
     """The run; when it is dropped its diagram, which nobody else has, goes with it.
 
-    Drake keeps a Python block, and all that it refers to, for ever: its callbacks refer
-    to the block. Emptied it takes a tenth of the room.
+    Without that a run stays in memory for ever: see `Block`.
     """
-    weakref.finalize(run, emptied, [*blocks_of(run.diagram)]).atexit = False
+    weakref.finalize(run, let_go, [*blocks_of(run.diagram)]).atexit = False
     return run
 
 
@@ -192,10 +191,10 @@ def blocks_of(diagram: Any) -> Iterator[Block]:
             yield from blocks_of(system)
 
 
-def emptied(blocks: list[Block]) -> None:
-    """Takes from blocks all that they refer to: they will not be asked again."""
+def let_go(blocks: list[Block]) -> None:
+    """Lets blocks go that will not be asked again."""
     for block in blocks:
-        block.__dict__.clear()
+        block.let_go()
 
 
 def simulate_diagram(

@@ -53,6 +53,8 @@ class WallMotionParams:
         [0.0, 0.0, 0.0], "sudden displacement", "m", least=-0.05, most=0.05, shape=(3,)
     )
     step_time: float = parameter(0.0, "when it steps", "s", least=0, most=1e4)
+    # At once it is a load that no arm can go before; a patient who is moved takes time.
+    step_duration: float = parameter(0.0, "of the step", "s", least=0, most=10)
     rise: list[float] = parameter(
         [0.0, 0.0, 0.0], "by an insufflation", "m", least=-0.05, most=0.05, shape=(3,)
     )
@@ -92,8 +94,8 @@ class WallMotionParams:
         """Where the wall is told to be, from its rest, in m (3)."""
         g = self.excursion(time)
         thrown = self.irregular.coughing(time)
-        jump = 1.0 if any(self.step) and time >= self.step_time else 0.0
-        r = self.risen(time)
+        jump = share_done(time, self.step_time, self.step_duration)
+        r = share_done(time, self.rise_time, self.rise_duration)
         return [
             b * g + s * jump + up * r + thrown * c
             for b, s, up, c in zip(
@@ -101,14 +103,19 @@ class WallMotionParams:
             )
         ]
 
-    def risen(self, time: float) -> float:
-        """Share of the insufflation that is done, smooth from 0 to 1."""
-        share = min(max((time - self.rise_time) / self.rise_duration, 0.0), 1.0)
-        return share * share * (3.0 - 2.0 * share)
-
     def stiffness_factor(self, time: float) -> float:
         """Trocar's stiffness against that of `AbdomenParams`."""
-        return 1.0 + self.stiffening * self.risen(time)
+        return 1.0 + self.stiffening * share_done(
+            time, self.rise_time, self.rise_duration
+        )
+
+
+def share_done(time: float, start: float, duration: float) -> float:
+    """Share of a motion that is done at a time in s, smooth from 0 to 1."""
+    if time < start or not duration:
+        return float(time >= start)
+    share = min((time - start) / duration, 1.0)
+    return share * share * (3.0 - 2.0 * share)
 
 
 def wave(kind: str, breaths: float) -> float:
@@ -148,7 +155,7 @@ def add_wall_motion(
         hold_still(builder, plant, abdomen.wall_instance)
         return
     times = np.arange(0.0, duration + 1.0, _KNOT)
-    if any(params.step):
+    if any(params.step) and not params.step_duration:
         edge = params.step_time
         times = np.sort(np.append(times, [edge - 1e-3, edge]))
         times = times[np.append(True, np.diff(times) > 1e-6)]

@@ -116,7 +116,7 @@ class PosedTools(Block):
             self._frames.append(self._add_tool(scene_graph, name, role))
             self._trocars.append(self._add_trocar(scene_graph, name, role))
             self._ports.append(self.signal_in(name, Shaft))
-        self.DeclareAbstractOutputPort(
+        self.value_out(
             "poses",
             lambda: Value(FramePoseVector()),
             self._calc_poses,

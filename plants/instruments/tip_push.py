@@ -7,8 +7,8 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
-from pydrake.systems.framework import LeafSystem
 
+from systems.common.block import Block
 from systems.common.parameter import check, parameter
 
 
@@ -35,7 +35,7 @@ class TipPushParams:
         return min(max(share, 0.0), 1.0) * np.array(self.force)
 
 
-class TipPush(LeafSystem):
+class TipPush(Block):
     """Pushes a body's point; held between its instants, so no Python is in a step.
 
     Port ``applied_spatial_force`` emits what the plant takes.
@@ -47,17 +47,19 @@ class TipPush(LeafSystem):
         self._params, self._body, self._point = check(params), body.index(), p_BT
         held = self.DeclareAbstractState(Value([self._push(0.0)]))
         self.DeclareStateOutputPort("applied_spatial_force", held)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(params.period, 0.0, self._update)
+        pushes = self.boxed(self._push)
+
+        def update(context: Any, state: Any) -> None:
+            held = state.get_mutable_abstract_state(0)
+            held.set_value([pushes[0](context.get_time())])
+
+        self.DeclarePeriodicUnrestrictedUpdateEvent(params.period, 0.0, update)
 
     def _push(self, time: float) -> ExternallyAppliedSpatialForce:
         push = ExternallyAppliedSpatialForce()
         push.body_index, push.p_BoBq_B = self._body, self._point
         push.F_Bq_W = SpatialForce(np.zeros(3), self._params.at(time))
         return push
-
-    def _update(self, context: Any, state: Any) -> None:
-        value = state.get_mutable_abstract_state(0)
-        value.set_value([self._push(context.get_time())])
 
 
 def add_tip_push(

@@ -194,7 +194,7 @@ class OrganTouch(Block):
         self._held = self.DeclareDiscreteState(
             np.zeros(5)
         )  # where along z of B, force, when next
-        self.DeclareAbstractOutputPort(
+        self.value_out(
             "applied",
             lambda: Value([ExternallyAppliedSpatialForce()]),
             self._calc_applied,

@@ -65,7 +65,7 @@ class PosedOrgans(Block):
             self._frames.append(frame)
         names = tuple(organ.name for organ in organs)
         self._moved = self.signal_in("organs", Many(MovingPoint, names))
-        self.DeclareAbstractOutputPort(
+        self.value_out(
             "poses",
             lambda: Value(FramePoseVector()),
             self._calc_poses,

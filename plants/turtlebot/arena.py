@@ -73,7 +73,7 @@ class Arena(Block):
             self._frames.append(frame)
         self._robot = self.signal_in("robot", RobotState)
         self._obstacles = self.signal_in("obstacles", OBSTACLES)
-        self.DeclareAbstractOutputPort(
+        self.value_out(
             "poses",
             lambda: Value(FramePoseVector()),
             self._calc_poses,

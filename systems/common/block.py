@@ -43,6 +43,10 @@ class Block(LeafSystem):
     keeps its state in the context. Its ports are declared with the signals they carry
     (`systems.common.signal`).
 
+    Drake's callbacks are C++ objects, which Python's collector does not see: a block
+    that they refer to would stay in memory for ever. They refer to boxes instead, and
+    `let_go` empties these.
+
     Attributes:
         signals: Every vector port's signal, by the port's name.
     """
@@ -50,6 +54,18 @@ class Block(LeafSystem):
     def __init__(self) -> None:
         super().__init__()
         self.signals: dict[str, Any] = {}
+        self._boxes: list[list[Any]] = []
+
+    def boxed(self, what: Any) -> list[Any]:
+        """A list of one thing, for a callback of Drake's to refer to."""
+        self._boxes.append([what])
+        return self._boxes[-1]
+
+    def let_go(self) -> None:
+        """Lets go of all that it refers to; it will not be asked again."""
+        for box in self._boxes:
+            box.clear()
+        self.__dict__.clear()
 
     def signal_in(
         self, name: str, signal: Any, drawn: RandomDistribution | None = None
@@ -117,14 +133,37 @@ class Block(LeafSystem):
             prerequisites: Tickets of all that `calc` reads, so that the value
                 is cached and feedthrough is known.
         """
+        block, calculates = self.boxed(self), self.boxed(calc)
 
         def set_output(context: Any, output: Any) -> None:
             outermost = not STOPWATCH.running and STOPWATCH.begin()
-            output.SetFromVector(calc(context))
+            output.SetFromVector(calculates[0](context))
             if outermost:
-                STOPWATCH.end(self.get_name(), context.get_time())
+                STOPWATCH.end(block[0].get_name(), context.get_time())
 
         return self.DeclareVectorOutputPort(name, size, set_output, prerequisites)
+
+    def value_out(
+        self,
+        name: str,
+        allocate: Callable[[], Any],
+        calc: Callable[[Any, Any], None],
+        prerequisites: set[Any],
+    ) -> Any:
+        """Declares an output port of an object.
+
+        Args:
+            name: The port's name.
+            allocate: Makes the `Value`; it must not refer to the block.
+            calc: Sets it for a context.
+            prerequisites: Tickets of all that `calc` reads.
+        """
+        sets = self.boxed(calc)
+
+        def set_output(context: Any, output: Any) -> None:
+            sets[0](context, output)
+
+        return self.DeclareAbstractOutputPort(name, allocate, set_output, prerequisites)
 
     def state_out(self, name: str, signal: Any, initial: np.ndarray) -> Any:
         """Declares a group of discrete state that is an output port as well.
@@ -159,9 +198,10 @@ class Block(LeafSystem):
             The cache entry: `Eval(context)` gives the value, `ticket()` makes
             it a prerequisite.
         """
+        calculates = self.boxed(calc)
 
         def store(context: Any, value: Any) -> None:
-            value.set_value(calc(context))
+            value.set_value(calculates[0](context))
 
         producer = ValueProducer(allocate=lambda: AbstractValue.Make([]), calc=store)
         return self.DeclareCacheEntry(name, producer, prerequisites)
@@ -197,16 +237,17 @@ class Block(LeafSystem):
         if not period > 0.0:
             raise ValueError(f"{type(self).__name__}: period={period} s must be > 0")
         groups = self.num_discrete_state_groups()
+        block, updates = self.boxed(self), self.boxed(update)
 
         def timed(context: Any, state: Any) -> None:
             outermost = not STOPWATCH.running and STOPWATCH.begin()
-            value: Any = update(context)
+            value: Any = updates[0](context)
             if groups == 1:
                 state.set_value(value)
             else:
                 for group, vector in enumerate(value):
                     state.set_value(group, vector)
             if outermost:
-                STOPWATCH.end(self.get_name(), context.get_time(), True)
+                STOPWATCH.end(block[0].get_name(), context.get_time(), True)
 
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, timed)

@@ -77,7 +77,7 @@ class PhasesParams:
         1e-3, "sigma of the fulcrum across the shaft", "m", above=0.0, most=0.02
     )
     sure_organ: float = parameter(
-        6e-4, "sigma of the organ's motion", "m", above=0.0, most=0.02
+        3e-4, "sigma of the organ's motion", "m", above=0.0, most=0.02
     )
     deviation: float = parameter(
         1.5e-4, "of the snake's body from its plan", "m", above=0.0, most=0.1

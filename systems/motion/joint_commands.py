@@ -84,7 +84,8 @@ class JointCommandsParams:
         above=0,
         most=1,
     )
-    # At the fulcrum; 2 mm are 1 N on a usual wall. A sound arm strays 0.3 mm.
+    # At the fulcrum, and the shaft ten times as far in rad; 2 mm are 1 N on a usual
+    # wall. A sound arm strays 0.3 mm.
     follow: float = parameter(
         2e-3, "how far the arm may stray from its command", "m", above=0, most=0.05
     )
@@ -259,7 +260,8 @@ def _free_step(
     q_m, v_m = np.array(measured.q), np.array(measured.v)
     if not finite_state(measured):  # unseen it is where it was told to be
         q_m, v_m = q, np.zeros(JOINTS)
-    strayed = np.abs(product(J[3:], q - q_m)).max() / constants.fulcrum_first
+    astray = np.abs(product(J, q - q_m))
+    strayed = max(astray[3:].max() / constants.fulcrum_first, 0.1 * astray[:3].max())
     left = max(rest[0] - constants.period, 0.0)
     if strayed > constants.follow:
         left = constants.limp_time

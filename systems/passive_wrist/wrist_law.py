@@ -182,7 +182,9 @@ def _watch(s: Floats, c: Any, force: float, valid: bool) -> None:
     dt = c.period
     s[OVER] = s[OVER] + dt if valid and force > c.force_limit else 0.0
     s[SILENT] = 0.0 if valid else s[SILENT] + dt
-    s[CALM] = s[CALM] + dt if valid and force < c.release_force else 0.0
+    # A sensor that is back is enough: it is the wrist that unloads the wall.
+    calm = valid and (force < c.release_force or s[FROZEN] == _SENSOR_LOST)
+    s[CALM] = s[CALM] + dt if calm else 0.0
     if s[FROZEN] != 0.0:
         if s[CALM] >= c.release_time:
             s[FROZEN] = 0.0

@@ -1,18 +1,20 @@
 """Organ estimator: where a point of an organ is now, learnt from breath to breath.
 
 What the tracker delivers is 20 to 50 ms old, in which an organ moves by half a
-millimetre. Breathing repeats itself: the estimate is a template of the breath, the mean
-over the last breaths in bins of their phase, read at the phase of now,
+millimetre. Breathing repeats itself, but no breath is like the other: it is longer or
+shorter, deeper or shallower. The estimate is a template of the breath, the mean over
+the last breaths in bins of their phase, read at the phase of now,
 
-    p(t) = b + T(phi(t)),   phi' = omega,
+    p(t) = b + d T(phi(t)),   phi' = omega,
 
-b being a slow offset. The phase is corrected with each frame (a phase-locked loop on
-the slope of T), so a breath may be longer than the one before. The first template is
-made from a record of some seconds, with the rate that `breathing_rate` finds in it.
+b being an offset and d the depth of this breath. An extended Kalman filter finds phi,
+omega, d and b within the breath; omega and d tend to the usual, which is learnt as the
+template is, with how far breaths differ. The first template is made from a record of
+some seconds, with the rate that `breathing_rate` finds in it.
 
-A cough or a breath that stops shows as frames that do not fit: *alarm*. The estimate
-is then the plain track of the frames, nothing is learnt, and the record is searched for
-the phase at which the template fits again.
+A cough or a breath that stops shows as frames that do not fit a breath of whatever
+length and depth: *alarm*. The estimate is then the plain track of the frames, nothing
+is learnt, and the record is searched for the breath that fits again.
 """
 
 from dataclasses import dataclass
@@ -26,7 +28,7 @@ from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Vector, example, reader
 from systems.common.signals import TrackedShaft
-from systems.passive_wrist.breathing_rate import find_breathing
+from systems.passive_wrist.breathing_rate import find_breathing, fit_breathing
 
 BINS = 100
 """Of the template."""
@@ -35,8 +37,20 @@ RECORD = 720
 _AVERAGED = 6  # frames in an entry of the record in which the rate is searched
 _SHORTEST = 480  # frames before the first search
 _SHARE = 1.5  # s of the record in which a lost phase is searched
+_TURNS = 6  # through the first record
+_EACH = 4  # of which frames the search takes one
 _EVERY = 12  # frames between two searches
+_TWICE = 0.5  # residual against amplitude at twice a rate that is half a breath's
+_TROUBLED, _TOO_MUCH = 12.0, 0.3  # s, share of them in alarm: it is learnt anew
+_DIES = 0.4  # s in which the difference of two that were found does
 _STRAYED = 2.5  # times the noise
+_DIFFER = 0.08  # by which breaths may differ until that is learnt
+_LEAST = 0.01
+_FEWEST, _MOST = 0.7, 1.4  # of the usual, that a breath's rate and depth may be
+_MORE = 1.5  # square of what the filter smooths away
+_EVENED, _EVENLY = 0.5, 0.2  # how soon the even phase follows, and draws the template
+_LOOSE = 0.15  # s by which the loose breath comes after the filter's
+_USUALLY = 3.0  # spreads of its misfit that are usual
 
 Floats = np.ndarray
 read_frame = reader(TrackedShaft)
@@ -61,11 +75,11 @@ class OrganEstimatorParams:
     """How the breath is learnt."""
 
     breaths: float = parameter(16.0, "that the template remembers", above=0, most=100)
-    bandwidth: float = parameter(
-        0.2, "of the phase-locked loop", "rad/s", above=0, most=10
+    offset_walk: float = parameter(
+        1e-4, "of the offset in a second", "m", above=0, most=0.01
     )
-    offset_time: float = parameter(
-        5.0, "time constant of the offset", "s", above=0, most=1e3
+    miss: float = parameter(
+        6e-4, "of a frame along an axis by noise and template", "m", above=0, most=0.01
     )
     noise: float = parameter(
         2e-4, "of a frame that is expected, in space", "m", above=0, most=0.01
@@ -86,16 +100,30 @@ class OrganEstimatorParams:
     period: float = parameter(1 / 120, "of the update", "s", above=0, most=0.1)
 
 
-SCALARS = ("phi", "omega", "time", "frames", "share", "misfit", "power", "alarm", "due")
-"""Phase in breaths at the last frame; rate in 1/s; time of the last frame in s; frames
-so far; share of the template that is in use; smoothed misfit in m; smoothed square of
-it; 1 in alarm; frames until the next search."""
-(PHI, OMEGA, TIME, FRAMES, SHARE, MISFIT, POWER, ALARM, DUE) = range(len(SCALARS))
-PLAIN = len(SCALARS)  # p, v of the plain track (6)
-OFFSET = PLAIN + 6  # b (3)
-TEMPLATE = OFFSET + 3  # (BINS, 3)
+SCALARS = (
+    *("time", "frames", "share", "power", "alarm", "due"),
+    *("trouble", "usual", "rates", "depths", "even"),
+)
+"""Time of the last frame in s; frames so far; share of the template that is in use;
+smoothed square of the misfit; 1 in alarm; frames until the next search; share of
+the last seconds in alarm; usual omega; mean squares by which omega (relative to it) and
+d differ from the usual; a phase that goes on more evenly than phi."""
+(TIME, FRAMES, SHARE, POWER, ALARM, DUE, TROUBLE, USUAL, RATES, DEPTHS, EVEN) = range(
+    len(SCALARS)
+)
+MISFIT = len(SCALARS)  # smoothed, as if it were noise alone (3)
+LOST = MISFIT + 3  # likewise, of the loose breath, as it is (3)
+AWAY = LOST + 3  # of what was said before another breath was found, dies away (3)
+PLAIN = AWAY + 3  # p, v of the plain track (6)
+BREATH = PLAIN + 6  # phi in breaths, omega in 1/s, d, b
+PHI, OMEGA, DEPTH, OFFSET = BREATH, BREATH + 1, BREATH + 2, BREATH + 3
+ORDER = 6
+LOOSE = BREATH + ORDER  # the same, not corrected but drawn after it (ORDER)
+SPREAD = LOOSE + ORDER  # its covariance (ORDER, ORDER)
+TEMPLATE = SPREAD + ORDER * ORDER  # (BINS, 3)
 WEIGHTS = TEMPLATE + 3 * BINS
-ROWS = WEIGHTS + BINS  # (RECORD, 4): time and place of the frames, a ring
+USUALLY = WEIGHTS + BINS  # mean square of the loose breath's misfit (BINS)
+ROWS = USUALLY + BINS  # (RECORD, 4): time and place of the frames, a ring
 SIZE = ROWS + 4 * RECORD
 
 
@@ -136,13 +164,77 @@ def learn(T: Floats, weights: Floats, phi: float, z: Floats, least: float) -> No
 
 
 @compiled
-def correct(c: Any, s: Floats, T: Floats, e: Floats, slope: Floats, dt: float) -> None:
-    """The phase-locked loop: phase and rate from a misfit e."""
-    steep = (slope * slope).sum() + c.flat**2
-    late = (slope * e).sum() / steep
-    s[PHI] += 1.4 * c.bandwidth * dt * late
-    s[OMEGA] += c.bandwidth**2 * dt * late
-    s[OMEGA] = min(max(s[OMEGA], 0.08), 0.6)
+def smoothed(T: Floats) -> Floats:
+    """The template with each bin a half its own and a quarter each neighbour's."""
+    out = np.empty_like(T)
+    for k in range(len(T)):
+        out[k] = 0.25 * T[k - 1] + 0.5 * T[k] + 0.25 * T[(k + 1) % len(T)]
+    return out
+
+
+@compiled
+def unknown(c: Any, x: Floats, P: Floats, usual: float) -> None:
+    """The breath's spread where phase, rate and depth have just been found."""
+    P[:] = 0.0
+    for k in range(ORDER):
+        P[k, k] = c.offset_walk**2
+    P[0, 0] = 0.02**2
+    P[1, 1] = (_DIFFER * usual) ** 2
+    P[2, 2] = _DIFFER**2
+
+
+@compiled
+def go_on(c: Any, s: Floats, x: Floats, P: Floats, dt: float) -> None:
+    """The breath and its spread after a time: omega and d tend to the usual."""
+    left = max(1.0 - s[USUAL] * dt, 0.0)
+    x[0] += dt * x[1]
+    x[1] = s[USUAL] * (1.0 + left * (min(max(x[1] / s[USUAL], _FEWEST), _MOST) - 1.0))
+    x[2] = 1.0 + left * (x[2] - 1.0)
+    for j in range(ORDER):
+        P[0, j] += dt * P[1, j]
+    for j in range(ORDER):
+        P[j, 0] += dt * P[j, 1]
+    for k in (1, 2):
+        for j in range(ORDER):
+            P[k, j] *= left
+            P[j, k] *= left
+    P[1, 1] += 2.0 * s[USUAL] ** 3 * dt * s[RATES]
+    P[2, 2] += 2.0 * s[USUAL] * dt * s[DEPTHS]
+    for k in range(3, ORDER):
+        P[k, k] += dt * c.offset_walk**2
+
+
+@compiled
+def correct(
+    x: Floats, P: Floats, T: Floats, z: Floats, miss: float
+) -> tuple[Floats, Floats]:
+    """The filter's step with a place z that is seen, in place.
+
+    Returns:
+        The misfit, and what it would be if noise were all that is not known.
+    """
+    value, slope = template_at(T, x[0])
+    e = z - x[3:] - x[2] * value
+    plain, dx = np.empty(3), np.zeros(ORDER)
+    h, Ph = np.zeros(ORDER), np.zeros(ORDER)
+    for i in range(3):  # the axes one after the other
+        h[:] = 0.0
+        h[0], h[2], h[3 + i] = x[2] * slope[i], value[i], 1.0
+        power, left = miss**2, e[i]
+        for j in range(ORDER):
+            Ph[j] = 0.0
+            for k in range(ORDER):
+                Ph[j] += P[j, k] * h[k]
+            power += h[j] * Ph[j]
+            left -= h[j] * dx[j]
+        plain[i] = left * miss / sqrt(power)
+        for j in range(ORDER):
+            dx[j] += Ph[j] * left / power
+            for k in range(ORDER):
+                P[j, k] -= Ph[j] * Ph[k] / power
+    x += dx
+    x[2] = min(max(x[2], _FEWEST), _MOST)
+    return e, plain
 
 
 @compiled
@@ -157,16 +249,64 @@ def track(c: Any, s: Floats, z: Floats, dt: float) -> None:
 
 
 @compiled
+def is_lost(c: Any, z: Floats, place: Floats, dt: float) -> bool:
+    """Whether a breath that is slow to follow misses what is seen.
+
+    The filter follows all that a breath may be. What stops or bursts leaves the loose
+    breath behind, by more than breaths that differ usually do at this phase.
+    """
+    s, x, y = z[:TEMPLATE], z[BREATH:LOOSE], z[LOOSE:SPREAD]
+    T = z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
+    usually = z[USUALLY:ROWS]
+    y[0] += dt * y[1]
+    e = place - y[3:] - y[2] * template_at(T, y[0])[0]
+    y += min(dt / _LOOSE, 1.0) * (x - y)
+    s[LOST:AWAY] += 0.7 * (e - s[LOST:AWAY])
+    square = (s[LOST:AWAY] ** 2).sum()
+    k = int((x[0] - floor(x[0])) * BINS)
+    if square > (0.7 * c.alarm) ** 2 + _USUALLY**2 * usually[k]:
+        return True
+    share = s[USUAL] * dt / c.breaths * BINS
+    for i in range(-2, 3):
+        j = (k + i) % BINS
+        usually[j] += 0.4 * share * (square - usually[j])
+    return False
+
+
+@compiled
+def report(z: Floats, time: float) -> Floats:
+    """The elements of `OrganMotion` at a time in s."""
+    s, x, T = z[:TEMPLATE], z[BREATH:LOOSE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
+    out = np.zeros(9)
+    ahead = max(0.0, time - s[TIME])
+    known = s[SHARE] > 0.0
+    out[0:3] = x[3:] + s[AWAY:PLAIN]
+    if s[ALARM] == 1.0:
+        out[0:3] = s[PLAIN : PLAIN + 3] + ahead * s[PLAIN + 3 : PLAIN + 6]
+        out[3:6] = s[PLAIN + 3 : PLAIN + 6]
+    elif known:
+        value, slope = template_at(T, x[0] + x[1] * ahead)
+        share = s[SHARE] * s[SHARE] * (3.0 - 2.0 * s[SHARE]) * x[2]
+        out[0:3] += share * value
+        out[3:6] = share * x[1] * slope
+    out[6] = sqrt(s[POWER]) if known else 1.0
+    out[7] = 1.0 if s[SHARE] == 1.0 and s[ALARM] == 0.0 else 0.0
+    out[8] = s[ALARM]
+    return out
+
+
+@compiled
 def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     """Takes a frame into the state z, in place."""
-    s = z[:TEMPLATE]
-    T, weights = z[TEMPLATE:WEIGHTS].reshape((BINS, 3)), z[WEIGHTS:ROWS]
+    s, x = z[:TEMPLATE], z[BREATH:LOOSE]
+    P = z[SPREAD:TEMPLATE].reshape((ORDER, ORDER))
+    T, weights = z[TEMPLATE:WEIGHTS].reshape((BINS, 3)), z[WEIGHTS:USUALLY]
     rows = z[ROWS:].reshape((RECORD, 4))
     first = s[FRAMES] == 0.0
     dt = time - s[TIME]
     if first:
         s[PLAIN : PLAIN + 3] = place
-        s[OFFSET:TEMPLATE] = place
+        s[OFFSET:LOOSE] = place
     else:
         track(c, s, place, dt)
     row = rows[int(s[FRAMES]) % RECORD]
@@ -177,118 +317,141 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     if first:
         return
     if s[SHARE] == 0.0:  # no template: the mean so far
-        b = s[OFFSET:TEMPLATE]
-        b += (place - b) / min(s[FRAMES], RECORD)
+        s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
+        x[3:] += (place - x[3:]) / min(s[FRAMES], RECORD)
         return
+    s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
     s[SHARE] = min(1.0, s[SHARE] + dt / c.start)
-    s[PHI] += s[OMEGA] * dt
-    value, slope = template_at(T, s[PHI])
-    b = s[OFFSET:TEMPLATE]
-    e = place - b - value
-    square = (e * e).sum()
-    s[MISFIT] += 0.5 * (sqrt(square) - s[MISFIT])
-    s[POWER] += dt * (square - s[POWER])
-    if s[MISFIT] > c.alarm:
-        s[ALARM] = 1.0
-    if s[ALARM] == 0.0:
-        correct(c, s, T, e, slope, dt)
-        b += dt / c.offset_time * e
-        learn(T, weights, s[PHI], place - b, s[OMEGA] * BINS * dt / c.breaths)
+    s[TROUBLE] += min(dt / _TROUBLED, 1.0) * (s[ALARM] - s[TROUBLE])
+    if s[ALARM] == 1.0:
+        return
+    go_on(c, s, x, P, dt)
+    e, plain = correct(x, P, T, place, c.miss)
+    s[POWER] += dt * ((e * e).sum() - s[POWER])
+    s[MISFIT:LOST] += 0.5 * (plain - s[MISFIT:LOST])
+    lost = is_lost(c, z, place, dt) or (s[MISFIT:LOST] ** 2).sum() > c.alarm**2
+    if lost:
+        s[AWAY:PLAIN] = 0.0
+        if s[SHARE] < 1.0:  # it was none
+            s[AWAY:PLAIN] = report(z, time)[:3] - x[3:]
+            s[SHARE] = 0.0
+        else:
+            s[ALARM] = 1.0
+        return
+    share = s[USUAL] * dt / c.breaths
+    value, slope = template_at(T, x[0])
+    # Any phase that rises fits as well: the one that is the most even is taken.
+    s[EVEN] += dt * s[USUAL] * (1.0 + _EVENED * (x[0] - s[EVEN]))
+    seen = place - x[3:] - (x[2] - 1.0) * value + _EVENLY * (x[0] - s[EVEN]) * slope
+    learn(T, weights, x[0], seen, share * BINS)
+    rate = x[1] / s[USUAL] - 1.0
+    s[RATES] += share * (_MORE * rate**2 - s[RATES])
+    s[DEPTHS] += share * (_MORE * (x[2] - 1.0) ** 2 - s[DEPTHS])
+    for k in (RATES, DEPTHS):
+        s[k] = min(max(s[k], _LEAST**2), _DIFFER**2)
+    s[USUAL] += share * (x[1] - s[USUAL])
 
 
 @compiled
 def search(c: Any, z: Floats) -> None:
-    """Looks for the phase at which the template fits the last frames, in place."""
-    s, T = z[:TEMPLATE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
+    """Looks for the breath that fits the last frames, in place.
+
+    Phase and rate are tried, depth and offset follow.
+    """
+    s, x, T = z[:TEMPLATE], z[BREATH:LOOSE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
     rows = z[ROWS:].reshape((RECORD, 4))
     count = 0
-    while count < min(s[FRAMES], RECORD):
-        row = rows[(int(s[FRAMES]) - 1 - count) % RECORD]
+    while _EACH * count < min(s[FRAMES], RECORD):
+        row = rows[(int(s[FRAMES]) - 1 - _EACH * count) % RECORD]
         if s[TIME] - row[0] > _SHARE:
             break
         count += 1
-    best, at = 1e9, 0.0
-    offset = np.zeros(3)
-    for k in range(BINS):
-        phi = k / BINS
-        total, squares = np.zeros(3), 0.0
+    best, found = 1e9, x.copy()
+    stiff = (c.fits / (3.0 * _DIFFER)) ** 2
+    for k in range(3 * BINS):
+        phi = k / (3 * BINS)
+        omega = s[USUAL] * (1.0 + _DIFFER * (k % 3 - 1))
+        here, there, both, one, other = np.zeros(3), np.zeros(3), 0.0, 0.0, 0.0
         for i in range(count):
-            row = rows[(int(s[FRAMES]) - 1 - i) % RECORD]
-            e = row[1:] - template_at(T, phi - s[OMEGA] * (s[TIME] - row[0]))[0]
-            total += e
-            squares += (e * e).sum()
-        mean = total / max(count, 1)
-        left = squares / max(count, 1) - (mean * mean).sum()
+            row = rows[(int(s[FRAMES]) - 1 - _EACH * i) % RECORD]
+            value = template_at(T, phi - omega * (s[TIME] - row[0]))[0]
+            seen = row[1:] - x[3:]
+            here += value / count
+            there += seen / count
+            one += (value * value).sum() / count
+            other += (seen * seen).sum() / count
+            both += (value * seen).sum() / count
+        one -= (here * here).sum()
+        other -= (there * there).sum()
+        both -= (here * there).sum()
+        d = (both + stiff) / (one + stiff)
+        left = other - 2.0 * d * both + d * d * one + stiff * (d - 1.0) ** 2
         if left < best:
-            best, at = left, phi
-            offset[:] = mean
-    moved = offset - s[OFFSET:TEMPLATE]
-    fits = best < c.fits**2 and (moved * moved).sum() < (10.0 * c.fits) ** 2
-    if fits:
-        s[PHI], s[ALARM], s[MISFIT] = at, 0.0, 0.0
-        s[POWER] = best
-        s[OFFSET:TEMPLATE] = offset
+            best = left
+            found[0], found[1], found[2] = phi, omega, d
+            found[3:] = x[3:] + there - d * here
+    moved = found[3:] - x[3:]
+    if best < c.fits**2 and (moved * moved).sum() < (10.0 * c.fits) ** 2:
+        before = report(z, s[TIME])[:3]
+        x[:] = found
+        z[LOOSE:SPREAD] = x
+        s[EVEN] = x[0]
+        unknown(c, x, z[SPREAD:TEMPLATE].reshape((ORDER, ORDER)), s[USUAL])
+        s[ALARM], s[POWER] = 0.0, best
+        s[MISFIT:AWAY] = 0.0
+        s[AWAY:PLAIN] = before - report(z, s[TIME])[:3]
 
 
 @compiled
-def begin(c: Any, z: Floats, rate: float) -> None:
-    """Makes the first template from the record, in place; rate in 1/s."""
-    s = z[:TEMPLATE]
-    T, weights = z[TEMPLATE:WEIGHTS].reshape((BINS, 3)), z[WEIGHTS:ROWS]
+def begin(c: Any, z: Floats, rate: float) -> float:
+    """Makes the first template from the record, in place; rate in 1/s.
+
+    Returns:
+        The rms misfit in m.
+    """
+    s, x = z[:TEMPLATE], z[BREATH:LOOSE]
+    P = z[SPREAD:TEMPLATE].reshape((ORDER, ORDER))
+    T, weights = z[TEMPLATE:WEIGHTS].reshape((BINS, 3)), z[WEIGHTS:USUALLY]
     rows = z[ROWS:].reshape((RECORD, 4))
     count = int(min(s[FRAMES], RECORD))
     first = int(s[FRAMES]) - count
-    s[OFFSET:TEMPLATE] = 0.0
+    start, left = rows[first % RECORD, 0], 0.0
+    mean = np.zeros(3)
     for i in range(count):
-        s[OFFSET:TEMPLATE] += rows[(first + i) % RECORD, 1:] / count
-    T[:] = 0.0
-    weights[:] = 0.0
-    s[OMEGA] = rate
-    for turn in range(4):
-        s[PHI] = (
-            0.0
-            if turn == 0
-            else s[PHI] - s[OMEGA] * (s[TIME] - rows[first % RECORD, 0])
-        )
-        before = rows[first % RECORD, 0]
+        mean += rows[(first + i) % RECORD, 1:] / count
+    s[USUAL] = rate
+    s[RATES] = s[DEPTHS] = _DIFFER**2
+    for turn in range(_TURNS):
+        x[0], x[1], x[2] = 0.0, s[USUAL], 1.0
+        x[3:] = mean
+        after, depth, left = np.zeros_like(T), 0.0, 0.0
+        weights[:] = 0.0
+        unknown(c, x, P, s[USUAL])
+        before = start
         for i in range(count):
             row = rows[(first + i) % RECORD]
-            dt = row[0] - before
+            place = row[1:] - x[3:]
+            if turn == 0:
+                x[0] = rate * (row[0] - start)
+            else:
+                go_on(c, s, x, P, row[0] - before)
+                miss = c.miss * 2.0 ** (_TURNS - 1 - turn)
+                e, _ = correct(x, P, T, row[1:], miss)
+                left += (e * e).sum() / count
+                place = row[1:] - x[3:] - (x[2] - 1.0) * template_at(T, x[0])[0]
             before = row[0]
-            s[PHI] += s[OMEGA] * dt
-            place = row[1:] - s[OFFSET:TEMPLATE]
-            if turn > 0:
-                value, slope = template_at(T, s[PHI])
-                correct(c, s, T, place - value, slope, dt)
-            learn(T, weights, s[PHI], place, 0.0)
-        if turn < 3:
-            weights *= 0.3
-    s[SHARE] = 1e-6
-    s[MISFIT], s[POWER], s[ALARM] = c.noise, c.noise**2, 0.0
-
-
-@compiled
-def report(z: Floats, time: float) -> Floats:
-    """The elements of `OrganMotion` at a time in s."""
-    s = z[:TEMPLATE]
-    T = z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
-    out = np.zeros(9)
-    ahead = max(0.0, time - s[TIME])
-    known = s[SHARE] > 0.0
-    if s[ALARM] == 1.0:
-        out[0:3] = s[PLAIN : PLAIN + 3] + ahead * s[PLAIN + 3 : PLAIN + 6]
-        out[3:6] = s[PLAIN + 3 : PLAIN + 6]
-    elif known:
-        value, slope = template_at(T, s[PHI] + s[OMEGA] * ahead)
-        share = s[SHARE] * s[SHARE] * (3.0 - 2.0 * s[SHARE])
-        out[0:3] = s[OFFSET:TEMPLATE] + share * value
-        out[3:6] = share * s[OMEGA] * slope
-    else:
-        out[0:3] = s[OFFSET:TEMPLATE]
-    out[6] = sqrt(s[POWER]) if known else 1.0
-    out[7] = 1.0 if s[SHARE] == 1.0 and s[ALARM] == 0.0 else 0.0
-    out[8] = s[ALARM]
-    return out
+            depth += x[2] / count
+            learn(after, weights, x[0], place, 0.0)
+        s[USUAL] = min(max(x[0] / (s[TIME] - start), 0.8 * rate), 1.25 * rate)
+        T[:] = after * depth  # at the mean depth
+        for _ in range(8 if turn < 2 else 1):  # breaths that differ leave steps in it
+            T[:] = smoothed(T)
+    s[SHARE], s[EVEN] = (1.0 if s[SHARE] > 0.0 else 1e-6), x[0]
+    z[LOOSE:SPREAD] = x
+    z[USUALLY:ROWS] = (0.35 * c.alarm) ** 2
+    s[POWER], s[ALARM], s[TROUBLE] = c.noise**2, 0.0, 0.0
+    s[MISFIT:AWAY] = 0.0
+    return sqrt(left)
 
 
 @compiled
@@ -311,8 +474,7 @@ def follow(packed: Floats, old: Floats, frame: Floats) -> Floats:
 def constants(params: OrganEstimatorParams) -> Floats:
     """The parameters as the compiled functions take them."""
     check(params)
-    # Below this slope in m a breath the phase is not heard.
-    return packed(params, flat=20.0 * params.noise)
+    return packed(params)
 
 
 class OrganEstimator(Block):
@@ -333,7 +495,7 @@ class OrganEstimator(Block):
         self._frame = self.signal_in("measurement", TrackedShaft)
         initial = np.zeros(SIZE)
         initial[TIME] = -1.0
-        initial[OFFSET:TEMPLATE] = example(OrganMotion).p
+        initial[OFFSET:LOOSE] = example(OrganMotion).p
         self.DeclareDiscreteState(initial)
         reads = {self._frame.ticket(), self.xd_ticket()}
         self._next = self.cached("next", self._calc_next, reads)
@@ -351,19 +513,35 @@ class OrganEstimator(Block):
         old = context.get_discrete_state_vector().value()
         z = follow(self._constants, old, self._frame.Eval(context))
         looks = z[FRAMES] >= _SHORTEST and z[FRAMES] % 60.0 == 0.0
-        if looks and z[SHARE] == 0.0 and z[FRAMES] > old[FRAMES]:
-            self._look(z)
+        if looks and z[FRAMES] > old[FRAMES]:
+            self.look(z)
         return z
 
-    def _look(self, z: Floats) -> None:
-        """Looks for the breath in the record, or for an organ that is still."""
+    def look(self, z: Floats) -> None:
+        """Looks for the breath in the record, or for an organ that is still.
+
+        Nothing is looked for where one is known and seldom lost.
+        """
         count = int(min(z[FRAMES], RECORD))
         rows = z[ROWS:].reshape(RECORD, 4)
         rows = np.roll(rows, -int(z[FRAMES]) % RECORD, axis=0)[-count:]
+        lost = z[TROUBLE] > _TOO_MUCH
+        if z[SHARE] > 0.0 and not lost:
+            return
         entries = rows[count % _AVERAGED :, 1:].reshape(-1, _AVERAGED, 3).mean(axis=1)
-        span = rows[-1, 0] - rows[0, 0]
-        fit = find_breathing(entries, span / (count - 1) * _AVERAGED, 3)
-        if fit is not None and fit.amplitude > max(self._p.noise, 3.0 * fit.residual):
-            begin(self._constants[0], z, fit.rate)
-        elif count == RECORD and entries.std(axis=0).max() < self._p.noise:
+        period = (rows[-1, 0] - rows[0, 0]) / (count - 1) * _AVERAGED
+        fit = find_breathing(entries, period, 3)
+        while fit is not None:  # two breaths that differ are no long one
+            twice = fit_breathing(entries, period, 3, 2.0 * fit.rate)
+            if twice.residual > _TWICE * twice.amplitude:
+                break
+            fit = twice
+        found = z.copy()
+        if fit is not None and fit.amplitude > max(self._p.noise, 2.0 * fit.residual):
+            # Two breaths are soon fitted: they have to fit better than three.
+            most = self._p.alarm * (1.0 if count == RECORD else 0.5)
+            if begin(self._constants[0], found, fit.rate) < most:
+                found[AWAY:PLAIN] += report(z, z[TIME])[:3] - report(found, z[TIME])[:3]
+                z[:] = found
+        elif not lost and count == RECORD and entries.std(axis=0).max() < self._p.noise:
             begin(self._constants[0], z, 0.25)

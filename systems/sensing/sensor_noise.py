@@ -11,23 +11,29 @@ import numpy as np
 type Faults = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 _BLOCK = 1024
+_KEPT = 8
+"""Blocks that are kept; a run needs one at a time."""
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=_KEPT)
 def _normal(seed: int, block: int, stream: int) -> np.ndarray:
     """Standard normal numbers, shape (1024, 6)."""
     key = np.random.SeedSequence([seed, stream, block + 1]).generate_state(2, np.uint64)
     return np.random.Generator(np.random.Philox(key=key)).standard_normal((_BLOCK, 6))
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=4096)
+def _walked(seed: int, blocks: int) -> np.ndarray:
+    """Where a random walk of unit steps is after so many blocks, shape (6,)."""
+    return _walk(seed, blocks - 1)[-1].copy() if blocks > 0 else np.zeros(6)
+
+
 def _walk(seed: int, block: int) -> np.ndarray:
-    """A random walk of unit steps, shape (1024, 6)."""
-    before = _walk(seed, block - 1)[-1] if block > 0 else np.zeros(6)
-    return before + np.cumsum(_normal(seed, block, 1), axis=0)
+    """A block of the walk, shape (1024, 6)."""
+    return _walked(seed, block) + np.cumsum(_normal(seed, block, 1), axis=0)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=_KEPT)
 def _faults(seed: int, block: int, faults: Faults) -> np.ndarray:
     white, drift, offset = faults
     return _normal(seed, block, 0) * white + _walk(seed, block) * drift + offset

@@ -9,7 +9,9 @@ The wall pushes the shaft sideways at the fulcrum, so that of a sound sensor's r
   A reading of the wrong sign has +K, and a wrist that trusts it runs away.
 
 What breaks one of the first two is silence to who listens, as long as it does. A sensor
-that answers motion with the wrong sign is not believed again.
+that answers motion with the wrong sign is not believed until the arm, which gives way
+meanwhile, has gone where the reading points: the wall's true force moves it. So a wall
+that moves faster than the shaft, which looks like a wrong sign, is told from one.
 """
 
 from collections.abc import Sequence
@@ -69,7 +71,7 @@ class WrenchWatchParams:
 
 
 class Watched(NamedTuple):
-    """What is remembered: of the last reading, and over the last ones."""
+    """Of the last reading, over the last ones, and of the largest not believed."""
 
     f: Vector
     p: Vector
@@ -77,6 +79,8 @@ class Watched(NamedTuple):
     answer: float
     travel: float
     liar: float
+    f_0: Vector
+    p_0: Vector
 
 
 @compiled
@@ -94,13 +98,23 @@ def explained(c: Any, shaft: ShaftMotion, wrench: Wrench) -> bool:
 
 
 @compiled
+def yielded(c: Any, df: Vector, ds: Vector, f: Vector) -> bool:
+    """Whether an arm that gives way went along the force f, which fell by that."""
+    travel = dot(ds, ds)
+    sure = 5.0 * sqrt(0.5 * c.power * travel)
+    falls = dot(df, ds) < -max(c.softest * travel, sure)
+    return falls and travel > c.answer_travel**2 and dot(ds, f) > 0.0
+
+
+@compiled
 def watch(
     c: Any, old: Watched, shaft: ShaftMotion, wrench: Wrench
 ) -> tuple[Watched, Wrench]:
     """The next memory, and the reading if it can be believed, else silence."""
     sound = finite_shaft(shaft) and wrench.valid > 0.5 and finite_wrench(wrench)
     if not sound or not explained(c, shaft, wrench):
-        return Watched(old.f, old.p, 1.0, 0.0, 0.0, old.liar), SILENCE
+        kept = (old.liar, old.f_0, old.p_0)
+        return Watched(old.f, old.p, 1.0, 0.0, 0.0, *kept), SILENCE
     depth = dot(shaft.u, sub(c.guess, shaft.p))
     f, p = across(wrench.f, shaft.u), along(shaft.p, depth, shaft.u)
     df, ds = sub(f, old.f), across(sub(p, old.p), shaft.u)
@@ -113,7 +127,12 @@ def watch(
     sure = 5.0 * sqrt(c.power * travel)  # what noise alone makes of it
     wrong = answer > max(c.softest * travel, sure) and norm(f) > c.answer_force
     liar = 1.0 if wrong and travel > c.answer_travel**2 else old.liar
-    state = Watched(f, p, noise, answer, travel, liar)
+    f_0, p_0 = old.f_0, old.p_0
+    if old.liar == 0.0 or norm(f) > norm(f_0) or dot(f, f_0) <= 0.0:
+        f_0, p_0 = f, p
+    elif yielded(c, sub(f, f_0), across(sub(p, p_0), shaft.u), f_0):
+        liar = answer = travel = 0.0
+    state = Watched(f, p, noise, answer, travel, liar, f_0, p_0)
     if liar > 0.0 or noise < c.still:
         return state, SILENCE
     return state, wrench
@@ -150,7 +169,7 @@ class WrenchWatch(StepBlock):
                 )
             ],
             {"shaft": ShaftMotion, "wrench": Wrench},
-            Watched(still, still, 1.0, 0.0, 0.0, 0.0),
+            Watched(still, still, 1.0, 0.0, 0.0, 0.0, still, still),
             {"believed": Wrench},
             params.period,
             timed=False,

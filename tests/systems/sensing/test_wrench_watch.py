@@ -88,6 +88,28 @@ def test_a_wrong_sign_is_never_believed_again(stiffness, seed):
     assert not believed[first:].any()
 
 
+def test_a_fast_wall_is_told_from_a_wrong_sign_once_the_arm_gave_way():
+    """30 mm in 0.2 s, a third of which the shaft follows; then it is limp."""
+
+    def wall(k):
+        return 0.03 * min(k / 24, 1.0) ** 2
+
+    def limp(k):
+        followed = 0.3 * wall(k)
+        return 0.03 - (0.03 - followed) * np.exp(-max(k - 24, 0) / 70)
+
+    def shaft(k):
+        return 0.3 * wall(k) if k < 24 else limp(k)
+
+    stream = list(readings(3, 120, 500.0, shaft, wall))
+    believed = valid(stream)
+    assert not believed[20:24].any() and believed[48:].all()
+    for k, (pose, w) in enumerate(stream[20:], 20):
+        flipped = Wrench(vector(-np.array(w.f)), vector(-np.array(w.m)), 1.0)
+        stream[k] = pose, flipped
+    assert not valid(stream)[48:].any()
+
+
 def test_a_frozen_reading_is_noticed_within_a_fifth_of_a_second():
     stream = list(readings(1, 120, 500.0, lambda k: 1e-3))
     frozen = stream[60][1]
