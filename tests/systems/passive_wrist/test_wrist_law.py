@@ -221,13 +221,13 @@ def test_the_probe_keeps_its_force_and_its_time():
 
 
 def probed(leeways) -> np.ndarray:
-    """How far the probe has moved the pivot after each update, in m."""
+    """How far the probe has moved the pivot along its axis at each update, in m."""
     dut = law(probe=True)
     state, offsets = initial(dut.p), []
     unsure = {"stiffness_sigma": 0.8, "p_WI": (0.0, 0.0, 0.0)}
     for leeway in leeways:
         state = dut.step(state, leeway=leeway, **unsure)
-        offsets.append(pivot(state)[1])
+        offsets.append(-pivot(state)[1])  # its first axis is -y here
     return np.array(offsets)
 
 
