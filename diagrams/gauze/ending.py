@@ -24,7 +24,7 @@ def last_event(scenario: GauzeScenario) -> float:
     goes_on = any(t.recording or t.hunt.speed or t.hand.seed or t.pushes for t in held)
     if goes_on or any(wall.rise) or wall.irregular.coughs or scenario.faults:
         return math.inf
-    steps = [wall.step_time] if any(wall.step) else []
+    steps = [wall.step_time + wall.step_duration] if any(wall.step) else []
     losses = [loss.end for loss in scenario.tracker.losses]
     return max(*(tool.times[-1] for tool in held), *losses, *steps)
 

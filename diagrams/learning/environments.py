@@ -15,7 +15,6 @@ from gymnasium.spaces import Box
 import numpy as np
 from pydrake.common import RandomGenerator
 
-from diagrams.campaigns.acts import texts
 from diagrams.campaigns.draws import operation
 from diagrams.campaigns.tape import Tape
 from diagrams.common.plots import COLORS, new_figure
@@ -180,7 +179,7 @@ class GauzeDelivery(Environment):
         drawn = operation(Tape([seed]))
         kept = ("robot.", "target.", "obstacle.p_WG", "obstacle.t", "obstacle.points")
         told = {k: v for k, v in drawn.items() if k.startswith((*kept, "camera."))}
-        scenario = scenario_of(deepcopy(base), texts(told), seed)
+        scenario = scenario_of(deepcopy(base), told, seed)
         obstacles = tuple(tool.name for tool in scenario.obstacles)
         inputs = {f"v{k}": Velocity for k in (1, 2, 3)} | {
             "guide": Guide,

@@ -18,7 +18,7 @@ is learnt, and the record is searched for the breath that fits again.
 """
 
 from dataclasses import dataclass
-from math import floor, sqrt
+from math import floor
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -29,30 +29,57 @@ from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Vector, example, reader
 from systems.common.signals import TrackedShaft
 from systems.passive_wrist.breathing_rate import find_breathing, fit_breathing
+from systems.sensing.breath_filter import (
+    ALARM,
+    AWAY,
+    BINS,
+    BREATH,
+    DEPTHS,
+    DIFFER,
+    DUE,
+    EVEN,
+    FRAMES,
+    LOOSE,
+    LOST,
+    MISFIT,
+    OFFSET,
+    ORDER,
+    PLAIN,
+    POWER,
+    RATES,
+    RECORD,
+    ROWS,
+    SHARE,
+    SIZE,
+    SPREAD,
+    TEMPLATE,
+    TIME,
+    TROUBLE,
+    USUAL,
+    USUALLY,
+    WEIGHTS,
+    Floats,
+    correct,
+    go_on,
+    learn,
+    report,
+    template_at,
+)
+from systems.sensing.breath_search import begin, search
 
-BINS = 100
-"""Of the template."""
-RECORD = 720
-"""Frames that are remembered."""
 _AVERAGED = 6  # frames in an entry of the record in which the rate is searched
 _SHORTEST = 480  # frames before the first search
-_SHARE = 1.5  # s of the record in which a lost phase is searched
-_TURNS = 6  # through the first record
-_EACH = 4  # of which frames the search takes one
 _EVERY = 12  # frames between two searches
 _TWICE = 0.5  # residual against amplitude at twice a rate that is half a breath's
 _TROUBLED, _TOO_MUCH = 12.0, 0.3  # s, share of them in alarm: it is learnt anew
 _DIES = 0.4  # s in which the difference of two that were found does
 _STRAYED = 2.5  # times the noise
-_DIFFER = 0.08  # by which breaths may differ until that is learnt
 _LEAST = 0.01
-_FEWEST, _MOST = 0.7, 1.4  # of the usual, that a breath's rate and depth may be
 _MORE = 1.5  # square of what the filter smooths away
 _EVENED, _EVENLY = 0.5, 0.2  # how soon the even phase follows, and draws the template
 _LOOSE = 0.15  # s by which the loose breath comes after the filter's
 _USUALLY = 3.0  # spreads of its misfit that are usual
 
-Floats = np.ndarray
 read_frame = reader(TrackedShaft)
 
 
@@ -100,143 +127,6 @@ class OrganEstimatorParams:
     period: float = parameter(1 / 120, "of the update", "s", above=0, most=0.1)
 
 
-SCALARS = (
-    *("time", "frames", "share", "power", "alarm", "due"),
-    *("trouble", "usual", "rates", "depths", "even"),
-)
-"""Time of the last frame in s; frames so far; share of the template that is in use;
-smoothed square of the misfit; 1 in alarm; frames until the next search; share of
-the last seconds in alarm; usual omega; mean squares by which omega (relative to it) and
-d differ from the usual; a phase that goes on more evenly than phi."""
-(TIME, FRAMES, SHARE, POWER, ALARM, DUE, TROUBLE, USUAL, RATES, DEPTHS, EVEN) = range(
-    len(SCALARS)
-)
-MISFIT = len(SCALARS)  # smoothed, as if it were noise alone (3)
-LOST = MISFIT + 3  # likewise, of the loose breath, as it is (3)
-AWAY = LOST + 3  # of what was said before another breath was found, dies away (3)
-PLAIN = AWAY + 3  # p, v of the plain track (6)
-BREATH = PLAIN + 6  # phi in breaths, omega in 1/s, d, b
-PHI, OMEGA, DEPTH, OFFSET = BREATH, BREATH + 1, BREATH + 2, BREATH + 3
-ORDER = 6
-LOOSE = BREATH + ORDER  # the same, not corrected but drawn after it (ORDER)
-SPREAD = LOOSE + ORDER  # its covariance (ORDER, ORDER)
-TEMPLATE = SPREAD + ORDER * ORDER  # (BINS, 3)
-WEIGHTS = TEMPLATE + 3 * BINS
-USUALLY = WEIGHTS + BINS  # mean square of the loose breath's misfit (BINS)
-ROWS = USUALLY + BINS  # (RECORD, 4): time and place of the frames, a ring
-SIZE = ROWS + 4 * RECORD
-
-
-@compiled
-def template_at(T: Floats, phi: float) -> tuple[Floats, Floats]:
-    """The template (bins, 3) at a phase in breaths, and its slope per breath.
-
-    Cubic between the bins (Catmull and Rom), periodic.
-    """
-    n = len(T)
-    place = (phi - floor(phi)) * n
-    k = int(place)
-    t = place - k
-    a, b, c, d = T[(k - 1) % n], T[k % n], T[(k + 1) % n], T[(k + 2) % n]
-    value = b + 0.5 * t * (
-        c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a))
-    )
-    slope = 0.5 * (
-        c
-        - a
-        + 2.0 * t * (2.0 * a - 5.0 * b + 4.0 * c - d)
-        + 3.0 * t * t * (3.0 * (b - c) + d - a)
-    )
-    return value, slope * n
-
-
-@compiled
-def learn(T: Floats, weights: Floats, phi: float, z: Floats, least: float) -> None:
-    """Moves the bins about a phase towards what was seen there, in place."""
-    n = len(T)
-    place = (phi - floor(phi)) * n
-    k = int(place)
-    t = place - k
-    e = z - template_at(T, phi)[0]
-    for i, w in ((k % n, 1.0 - t), ((k + 1) % n, t)):
-        weights[i] += w
-        T[i] += w * max(least, 1.0 / max(weights[i], 1.0)) * e
-
-
-@compiled
-def smoothed(T: Floats) -> Floats:
-    """The template with each bin a half its own and a quarter each neighbour's."""
-    out = np.empty_like(T)
-    for k in range(len(T)):
-        out[k] = 0.25 * T[k - 1] + 0.5 * T[k] + 0.25 * T[(k + 1) % len(T)]
-    return out
-
-
-@compiled
-def unknown(c: Any, x: Floats, P: Floats, usual: float) -> None:
-    """The breath's spread where phase, rate and depth have just been found."""
-    P[:] = 0.0
-    for k in range(ORDER):
-        P[k, k] = c.offset_walk**2
-    P[0, 0] = 0.02**2
-    P[1, 1] = (_DIFFER * usual) ** 2
-    P[2, 2] = _DIFFER**2
-
-
-@compiled
-def go_on(c: Any, s: Floats, x: Floats, P: Floats, dt: float) -> None:
-    """The breath and its spread after a time: omega and d tend to the usual."""
-    left = max(1.0 - s[USUAL] * dt, 0.0)
-    x[0] += dt * x[1]
-    x[1] = s[USUAL] * (1.0 + left * (min(max(x[1] / s[USUAL], _FEWEST), _MOST) - 1.0))
-    x[2] = 1.0 + left * (x[2] - 1.0)
-    for j in range(ORDER):
-        P[0, j] += dt * P[1, j]
-    for j in range(ORDER):
-        P[j, 0] += dt * P[j, 1]
-    for k in (1, 2):
-        for j in range(ORDER):
-            P[k, j] *= left
-            P[j, k] *= left
-    P[1, 1] += 2.0 * s[USUAL] ** 3 * dt * s[RATES]
-    P[2, 2] += 2.0 * s[USUAL] * dt * s[DEPTHS]
-    for k in range(3, ORDER):
-        P[k, k] += dt * c.offset_walk**2
-
-
-@compiled
-def correct(
-    x: Floats, P: Floats, T: Floats, z: Floats, miss: float
-) -> tuple[Floats, Floats]:
-    """The filter's step with a place z that is seen, in place.
-
-    Returns:
-        The misfit, and what it would be if noise were all that is not known.
-    """
-    value, slope = template_at(T, x[0])
-    e = z - x[3:] - x[2] * value
-    plain, dx = np.empty(3), np.zeros(ORDER)
-    h, Ph = np.zeros(ORDER), np.zeros(ORDER)
-    for i in range(3):  # the axes one after the other
-        h[:] = 0.0
-        h[0], h[2], h[3 + i] = x[2] * slope[i], value[i], 1.0
-        power, left = miss**2, e[i]
-        for j in range(ORDER):
-            Ph[j] = 0.0
-            for k in range(ORDER):
-                Ph[j] += P[j, k] * h[k]
-            power += h[j] * Ph[j]
-            left -= h[j] * dx[j]
-        plain[i] = left * miss / sqrt(power)
-        for j in range(ORDER):
-            dx[j] += Ph[j] * left / power
-            for k in range(ORDER):
-                P[j, k] -= Ph[j] * Ph[k] / power
-    x += dx
-    x[2] = min(max(x[2], _FEWEST), _MOST)
-    return e, plain
-
-
 @compiled
 def track(c: Any, s: Floats, z: Floats, dt: float) -> None:
     """The plain track: an alpha-beta filter of the frames, quick where they stray."""
@@ -274,28 +164,6 @@ def is_lost(c: Any, z: Floats, place: Floats, dt: float) -> bool:
 
 
 @compiled
-def report(z: Floats, time: float) -> Floats:
-    """The elements of `OrganMotion` at a time in s."""
-    s, x, T = z[:TEMPLATE], z[BREATH:LOOSE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
-    out = np.zeros(9)
-    ahead = max(0.0, time - s[TIME])
-    known = s[SHARE] > 0.0
-    out[0:3] = x[3:] + s[AWAY:PLAIN]
-    if s[ALARM] == 1.0:
-        out[0:3] = s[PLAIN : PLAIN + 3] + ahead * s[PLAIN + 3 : PLAIN + 6]
-        out[3:6] = s[PLAIN + 3 : PLAIN + 6]
-    elif known:
-        value, slope = template_at(T, x[0] + x[1] * ahead)
-        share = s[SHARE] * s[SHARE] * (3.0 - 2.0 * s[SHARE]) * x[2]
-        out[0:3] += share * value
-        out[3:6] = share * x[1] * slope
-    out[6] = sqrt(s[POWER]) if known else 1.0
-    out[7] = 1.0 if s[SHARE] == 1.0 and s[ALARM] == 0.0 else 0.0
-    out[8] = s[ALARM]
-    return out
-
-
-@compiled
 def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     """Takes a frame into the state z, in place."""
     s, x = z[:TEMPLATE], z[BREATH:LOOSE]
@@ -316,11 +184,10 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     s[TIME] = time
     if first:
         return
+    s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
     if s[SHARE] == 0.0:  # no template: the mean so far
-        s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
         x[3:] += (place - x[3:]) / min(s[FRAMES], RECORD)
         return
-    s[AWAY:PLAIN] *= max(1.0 - dt / _DIES, 0.0)
     s[SHARE] = min(1.0, s[SHARE] + dt / c.start)
     s[TROUBLE] += min(dt / _TROUBLED, 1.0) * (s[ALARM] - s[TROUBLE])
     if s[ALARM] == 1.0:
@@ -348,110 +215,8 @@ def take(c: Any, z: Floats, time: float, place: Floats) -> None:
     s[RATES] += share * (_MORE * rate**2 - s[RATES])
     s[DEPTHS] += share * (_MORE * (x[2] - 1.0) ** 2 - s[DEPTHS])
     for k in (RATES, DEPTHS):
-        s[k] = min(max(s[k], _LEAST**2), _DIFFER**2)
+        s[k] = min(max(s[k], _LEAST**2), DIFFER**2)
     s[USUAL] += share * (x[1] - s[USUAL])
-
-
-@compiled
-def search(c: Any, z: Floats) -> None:
-    """Looks for the breath that fits the last frames, in place.
-
-    Phase and rate are tried, depth and offset follow.
-    """
-    s, x, T = z[:TEMPLATE], z[BREATH:LOOSE], z[TEMPLATE:WEIGHTS].reshape((BINS, 3))
-    rows = z[ROWS:].reshape((RECORD, 4))
-    count = 0
-    while _EACH * count < min(s[FRAMES], RECORD):
-        row = rows[(int(s[FRAMES]) - 1 - _EACH * count) % RECORD]
-        if s[TIME] - row[0] > _SHARE:
-            break
-        count += 1
-    best, found = 1e9, x.copy()
-    stiff = (c.fits / (3.0 * _DIFFER)) ** 2
-    for k in range(3 * BINS):
-        phi = k / (3 * BINS)
-        omega = s[USUAL] * (1.0 + _DIFFER * (k % 3 - 1))
-        here, there, both, one, other = np.zeros(3), np.zeros(3), 0.0, 0.0, 0.0
-        for i in range(count):
-            row = rows[(int(s[FRAMES]) - 1 - _EACH * i) % RECORD]
-            value = template_at(T, phi - omega * (s[TIME] - row[0]))[0]
-            seen = row[1:] - x[3:]
-            here += value / count
-            there += seen / count
-            one += (value * value).sum() / count
-            other += (seen * seen).sum() / count
-            both += (value * seen).sum() / count
-        one -= (here * here).sum()
-        other -= (there * there).sum()
-        both -= (here * there).sum()
-        d = (both + stiff) / (one + stiff)
-        left = other - 2.0 * d * both + d * d * one + stiff * (d - 1.0) ** 2
-        if left < best:
-            best = left
-            found[0], found[1], found[2] = phi, omega, d
-            found[3:] = x[3:] + there - d * here
-    moved = found[3:] - x[3:]
-    if best < c.fits**2 and (moved * moved).sum() < (10.0 * c.fits) ** 2:
-        before = report(z, s[TIME])[:3]
-        x[:] = found
-        z[LOOSE:SPREAD] = x
-        s[EVEN] = x[0]
-        unknown(c, x, z[SPREAD:TEMPLATE].reshape((ORDER, ORDER)), s[USUAL])
-        s[ALARM], s[POWER] = 0.0, best
-        s[MISFIT:AWAY] = 0.0
-        s[AWAY:PLAIN] = before - report(z, s[TIME])[:3]
-
-
-@compiled
-def begin(c: Any, z: Floats, rate: float) -> float:
-    """Makes the first template from the record, in place; rate in 1/s.
-
-    Returns:
-        The rms misfit in m.
-    """
-    s, x = z[:TEMPLATE], z[BREATH:LOOSE]
-    P = z[SPREAD:TEMPLATE].reshape((ORDER, ORDER))
-    T, weights = z[TEMPLATE:WEIGHTS].reshape((BINS, 3)), z[WEIGHTS:USUALLY]
-    rows = z[ROWS:].reshape((RECORD, 4))
-    count = int(min(s[FRAMES], RECORD))
-    first = int(s[FRAMES]) - count
-    start, left = rows[first % RECORD, 0], 0.0
-    mean = np.zeros(3)
-    for i in range(count):
-        mean += rows[(first + i) % RECORD, 1:] / count
-    s[USUAL] = rate
-    s[RATES] = s[DEPTHS] = _DIFFER**2
-    for turn in range(_TURNS):
-        x[0], x[1], x[2] = 0.0, s[USUAL], 1.0
-        x[3:] = mean
-        after, depth, left = np.zeros_like(T), 0.0, 0.0
-        weights[:] = 0.0
-        unknown(c, x, P, s[USUAL])
-        before = start
-        for i in range(count):
-            row = rows[(first + i) % RECORD]
-            place = row[1:] - x[3:]
-            if turn == 0:
-                x[0] = rate * (row[0] - start)
-            else:
-                go_on(c, s, x, P, row[0] - before)
-                miss = c.miss * 2.0 ** (_TURNS - 1 - turn)
-                e, _ = correct(x, P, T, row[1:], miss)
-                left += (e * e).sum() / count
-                place = row[1:] - x[3:] - (x[2] - 1.0) * template_at(T, x[0])[0]
-            before = row[0]
-            depth += x[2] / count
-            learn(after, weights, x[0], place, 0.0)
-        s[USUAL] = min(max(x[0] / (s[TIME] - start), 0.8 * rate), 1.25 * rate)
-        T[:] = after * depth  # at the mean depth
-        for _ in range(8 if turn < 2 else 1):  # breaths that differ leave steps in it
-            T[:] = smoothed(T)
-    s[SHARE], s[EVEN] = (1.0 if s[SHARE] > 0.0 else 1e-6), x[0]
-    z[LOOSE:SPREAD] = x
-    z[USUALLY:ROWS] = (0.35 * c.alarm) ** 2
-    s[POWER], s[ALARM], s[TROUBLE] = c.noise**2, 0.0, 0.0
-    s[MISFIT:AWAY] = 0.0
-    return sqrt(left)
 
 
 @compiled

@@ -33,6 +33,12 @@ def test_the_wall_follows_a_curve_again_and_again(tmp_path):
         assert wall.displacement(time)[0] == pytest.approx(0.005)
 
 
+def test_a_step_may_take_its_time():
+    wall = WallMotionParams(step=[0.03, 0.0, 0.0], step_time=2.0, step_duration=0.4)
+    told = [wall.displacement(time)[0] for time in (1.9, 2.0, 2.2, 2.4, 9.0)]
+    np.testing.assert_allclose(told, [0.0, 0.0, 0.015, 0.03, 0.03], atol=1e-9)
+
+
 def test_organs_breathe_with_the_recorded_curve(tmp_path):
     path = tmp_path / "curve.csv"
     path.write_text("t,b\n0,0\n1,1\n3,-1\n4,0\n")

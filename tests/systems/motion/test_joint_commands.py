@@ -198,6 +198,18 @@ def test_an_arm_that_does_not_follow_goes_limp():
     assert (status[limp : limp + round(params.limp_time * 120)] == LIMP).all()
 
 
+def test_an_arm_that_does_not_turn_about_its_fulcrum_goes_limp():
+    """About the fulcrum it is off in direction alone: 30 mrad, then 10."""
+    _, p, u, J = kinematics(READY_POSTURE)
+    e = np.cross(u, [1.0, 0.0, 0.0])
+    e /= np.linalg.norm(e)
+    twist = np.concatenate([e, np.zeros(3)])  # about the tip, which stands for it
+    for angle, is_limp in ((0.03, True), (0.01, False)):
+        q = READY_POSTURE + np.linalg.pinv(J) @ (angle * twist)
+        told = {"fulcrum": p, "arm_state": np.concatenate([q, np.zeros(7)])}
+        assert (follow(circle, 0.02, None, told)[-1][2][0] == LIMP) == is_limp
+
+
 @pytest.mark.parametrize("stop", [Stop.WALL_LOADED, Stop.SENSOR_LOST])
 def test_a_loaded_wall_makes_the_arm_give_way(stop):
     permission = flat(Permission(0.0, float(stop)))

@@ -181,6 +181,8 @@ def test_a_lost_sensor_stops_and_lets_go_again():
     state = steps(dut, 10, state, valid=0.0)
     assert state[FROZEN] == Stop.SENSOR_LOST
     assert steps(dut, 40, state)[FROZEN] == 0.0
+    assert steps(dut, 10, state, f=(4.0, 0.0, 0.0))[FROZEN] == Stop.SENSOR_LOST
+    assert steps(dut, 40, state, f=(4.0, 0.0, 0.0))[FROZEN] == 0.0
 
 
 def test_an_estimate_that_is_no_number_counts_as_a_lost_sensor():
