@@ -13,6 +13,8 @@ type Faults = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 _BLOCK = 1024
 _KEPT = 8
 """Blocks that are kept; a run needs one at a time."""
+_STRIDE = 100
+"""Blocks of a walk at the most that are called one within the other."""
 
 
 @lru_cache(maxsize=_KEPT)
@@ -25,6 +27,8 @@ def _normal(seed: int, block: int, stream: int) -> np.ndarray:
 @lru_cache(maxsize=4096)
 def _walked(seed: int, blocks: int) -> np.ndarray:
     """Where a random walk of unit steps is after so many blocks, shape (6,)."""
+    for before in range(_STRIDE, blocks, _STRIDE):
+        _walked(seed, before)
     return _walk(seed, blocks - 1)[-1].copy() if blocks > 0 else np.zeros(6)
 
 
