@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.gauze.scenario import WITHOUT_OBSTACLE
-from diagrams.gauze.tools import gap
+from diagrams.gauze.tools import OBSTACLE, gap
 
 HAND_OVER = 0.02
 """The robot hands over while its tip is this near to S's tip; S may be touched [m]."""
@@ -24,7 +24,12 @@ def bypass_figures(
     time = run.signals["time"]
     status = run.planner.clearance
     near = status.near > 0.5
-    held = status.condition[near] > 0.5
+    # Of a hand that the tracker has lost nobody knows how fast it comes.
+    known = [
+        run.signals[f"{tool.name}.estimate.known"] > 0.5
+        for tool in run.case.scenario.of_role(OBSTACLE)
+    ]
+    held = (np.all(known, axis=0) & (status.condition > 0.5))[near]
     approach = tip_error > HAND_OVER
     to_target = gap(run, "target")[approach]
     figures = {

@@ -67,6 +67,11 @@ class JointCommandsParams:
     joint_speed: float = parameter(
         0.8, "share of the joints' rated speeds that may be used", above=0, most=1
     )
+    # More than a joint's torque can give leaves it behind its command, and what joint 1
+    # lags is seen at the fulcrum.
+    joint_torque: float = parameter(
+        0.8, "share of the rated torques to change speeds with", above=0, most=1
+    )
     joint_margin: float = parameter(
         0.03, "distance kept from the joints' end stops", "rad", least=0, most=0.5
     )
@@ -148,6 +153,7 @@ def problem(
     constants: Any,
     arm: Any,
     q: np.ndarray,
+    before: np.ndarray,
     time: float,
     tool: ToolMotion,
     fulcrum: Point,
@@ -161,6 +167,7 @@ def problem(
         constants: A record of `JointCommands`.
         arm: A record of `read_arm`.
         q: Commanded joint positions (7) [rad].
+        before: Joint velocities so far (7) [rad/s].
         time: Now [s].
         tool: The command.
         fulcrum: The shaft's; the tip stands for it if it is no number.
@@ -183,12 +190,15 @@ def problem(
         for k in range(3):
             J[3 + k, i] = constants.fulcrum_first * (J[3 + k, i] + dv[k])
     V[3:] *= constants.fulcrum_first
+    low = np.maximum(-constants.speed, (constants.low - q) / period)
+    high = np.minimum(constants.speed, (constants.high - q) / period)
+    change = constants.acceleration * period  # the end stops come before it
     return (
         J,
         V,
         constants.centering * (constants.nominal - q),
-        np.maximum(-constants.speed, (constants.low - q) / period),
-        np.minimum(constants.speed, (constants.high - q) / period),
+        np.minimum(np.maximum(low, before - change), high),
+        np.maximum(np.minimum(high, before + change), low),
         weight,
     )
 
@@ -198,12 +208,13 @@ def _problem(
     record: np.ndarray,
     arm: np.ndarray,
     q: np.ndarray,
+    before: np.ndarray,
     time: float,
     tool: np.ndarray,
     fulcrum: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     told = read_tool(tool), read_point(fulcrum)
-    return problem(record[0], arm[0], q, time, told[0], told[1])
+    return problem(record[0], arm[0], q, before, time, told[0], told[1])
 
 
 @compiled
@@ -243,41 +254,61 @@ def _free_step(
     arm: Any,
     q: np.ndarray,
     rest: np.ndarray,
+    before: np.ndarray,
     time: float,
     tool: ToolMotion,
     fulcrum: Point,
     measured: ArmState,
     permission: Permission,
-) -> tuple[np.ndarray, np.ndarray, Status, float, float]:
-    """What `command` gives, how long the arm stays limp, and whether that is final.
+) -> tuple[np.ndarray, np.ndarray, Status, float, np.ndarray, float]:
+    """What `command` gives, how long the arm stays limp, its velocities, and if final.
 
-    It is 1 if it is, and 0 if the free minimum does not keep the bounds.
+    The last is 1 if that is so, and 0 if the free minimum does not keep the bounds.
     """
+    still = np.zeros(JOINTS)
     if not finite_motion(tool):  # hold still
         weight = tool_state(arm, q)[3]
-        return command(constants, q, np.zeros(JOINTS), weight, np.inf) + (0.0, 1.0)
-    J, V, v_nominal, low, high, weight = problem(constants, arm, q, time, tool, fulcrum)
+        return command(constants, q, still, weight, np.inf) + (0.0, still, 1.0)
+    J, V, v_nominal, low, high, weight = problem(
+        constants, arm, q, before, time, tool, fulcrum
+    )
     q_m, v_m = np.array(measured.q), np.array(measured.v)
     if not finite_state(measured):  # unseen it is where it was told to be
-        q_m, v_m = q, np.zeros(JOINTS)
+        q_m, v_m = q, still
     astray = np.abs(product(J, q - q_m))
     strayed = max(astray[3:].max() / constants.fulcrum_first, 0.1 * astray[:3].max())
     left = max(rest[0] - constants.period, 0.0)
     if strayed > constants.follow:
         left = constants.limp_time
     if left > 0.0 or permission.code in _GIVE_WAY:
-        _, set_point, _ = command(constants, q_m, np.zeros(JOINTS), weight, 0.0)
+        _, set_point, _ = command(constants, q_m, still, weight, 0.0)
         # Most of the servos' own damping is taken away as well.
         lag = constants.lead - constants.period
         set_point[:JOINTS] += _YIELD * lag * v_m
-        return q_m, set_point, Status(LIMP), left, 1.0
+        return q_m, set_point, Status(LIMP), left, v_m, 1.0
     v = free_velocity(J, V, v_nominal)
     shortfall = missing(constants, J, v, V)
     is_free = 1.0
     for i in range(JOINTS):
         if not low[i] <= v[i] <= high[i]:
             is_free = 0.0
-    return command(constants, q, v, weight, shortfall) + (0.0, is_free)
+    return command(constants, q, v, weight, shortfall) + (0.0, v, is_free)
+
+
+def accelerations(plant: Any, q: np.ndarray) -> np.ndarray:
+    """What each joint alone can do with its rated torque, the others at rest.
+
+    Args:
+        plant: The arm alone, with its instrument.
+        q: Posture (7) [rad].
+
+    Returns:
+        In rad/s^2 (7).
+    """
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q)
+    inertia = plant.CalcMassMatrix(context)
+    return np.array(plant.GetEffortUpperLimits() / np.diag(inertia))
 
 
 class JointCommands(Block):
@@ -327,13 +358,15 @@ class JointCommands(Block):
             low=plant.GetPositionLowerLimits() + params.joint_margin,
             high=plant.GetPositionUpperLimits() - params.joint_margin,
             speed=params.joint_speed * plant.GetVelocityUpperLimits(),
+            acceleration=params.joint_torque * accelerations(plant, nominal),
             lead=set_point.lead,
             compliance=set_point.compliance,
         )
         signals = {"posture": Posture, "set_point": ArmState, "status": Status}
-        sizes = [*map(size, signals.values()), 1, 1]
+        sizes = [*map(size, signals.values()), 1, JOINTS, 1]
         told = [ToolMotion, Point, ArmState, Permission]
-        self._step = wired(_free_step, 2, [JOINTS, 1], told, sizes, True)
+        self._places = np.cumsum(sizes)[:-1]
+        self._step = wired(_free_step, 2, [JOINTS, 1, JOINTS], told, sizes, True)
         self._tool = self.signal_in("tool", ToolMotion)
         self._fulcrum = self.signal_in("fulcrum", Point)
         self._measured = self.signal_in("arm_state", ArmState)
@@ -343,6 +376,7 @@ class JointCommands(Block):
         for (name, signal), state in zip(signals.items(), start, strict=True):
             self.state_out(name, signal, flat(state))
         self.DeclareDiscreteState(1)  # s that it stays limp
+        self.DeclareDiscreteState(JOINTS)  # its velocities, rad/s
         ports = (self._tool, self._fulcrum, self._measured, self._permission)
         reads = {self.xd_ticket(), self.time_ticket(), *(p.ticket() for p in ports)}
         self._next = self.cached("next", self._calc_next, reads)
@@ -357,6 +391,7 @@ class JointCommands(Block):
     def _calc_next(self, context: Any) -> Sequence[Any]:
         q = context.get_discrete_state(0).value()
         rest = context.get_discrete_state(3).value()
+        before = context.get_discrete_state(4).value()
         tool, time = self._tool.Eval(context), context.get_time()
 
         def told(port: Any, instead: Callable[[], np.ndarray]) -> np.ndarray:
@@ -367,11 +402,12 @@ class JointCommands(Block):
         permission = told(self._permission, lambda: _FREE)
         constants, arm = self._constants, self._arm
         step = self._step(
-            constants, arm, q, rest, time, tool, fulcrum, measured, permission
+            constants, arm, q, rest, before, time, tool, fulcrum, measured, permission
         )
-        if step[-1]:
-            return step[:JOINTS], step[JOINTS:-3], step[-3:-2], step[-2:-1]
-        J, V, *bounds, weight = _problem(constants, arm, q, time, tool, fulcrum)
+        *given, final = np.split(step, self._places)
+        if final[0]:
+            return given
+        J, V, *bounds, weight = _problem(constants, arm, q, before, time, tool, fulcrum)
         v = joint_velocity(J, V, *bounds)
         short = missing(constants[0], J, v, V)
-        return *command(constants[0], q, v, weight, short), step[-2:-1]
+        return *command(constants[0], q, v, weight, short), given[3], v

@@ -161,6 +161,26 @@ def test_too_fast_a_command_is_reported_and_bounded():
     assert rows[-1][2][0] == 1.0
 
 
+def test_joints_change_speed_no_faster_than_their_torque_allows():
+    """The command leaps by 20 mm: the arm is there soon, and was asked no more."""
+
+    def leap(t):
+        tip, u, still = (0.02, 0.0, -0.12), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)
+        return ToolMotion(tip, u, still, still, t)
+
+    most = joint_commands.accelerations(PLANT, np.array(READY_POSTURE)) * PERIOD
+
+    def leaping(share):
+        rows = follow(leap, 1.0, JointCommandsParams(joint_torque=share))
+        v = np.diff([READY_POSTURE, *(row[0] for row in rows)], axis=0) / PERIOD
+        return abs(np.diff(v, axis=0, prepend=0.0)) / most, kinematics(rows[-1][0])[1]
+
+    share, tip = leaping(0.2)
+    assert share.max() == pytest.approx(0.2, rel=1e-6)
+    np.testing.assert_allclose(tip, [0.02, 0.0, -0.12], atol=1e-4)
+    assert leaping(1.0)[0].max() > 0.3
+
+
 def test_the_tool_rolls_about_its_shaft_alone():
     params = JointCommandsParams(roll=0.5, roll_period=5.0)
     ends = [follow(circle, 2.5, p)[-1][0] for p in (None, params)]
@@ -230,7 +250,7 @@ def test_quadprog_is_asked_only_where_bounds_are_met(monkeypatch):
         return joint_velocity(*args)
 
     monkeypatch.setattr(joint_commands, "joint_velocity", watched)
-    follow(circle, 0.1)
+    follow(lambda t: circle(t, 0.005), 0.1)  # slow enough to begin at once
     assert not asked
     follow(circle, 0.1, JointCommandsParams(joint_speed=0.01))
     assert asked
