@@ -28,6 +28,7 @@ from systems.perception.grid_mapping import GridMapping
 from systems.perception.tracking import Tracking
 from systems.switching.classical_planner import ClassicalPlanner
 from systems.switching.navigation_planner import PERIOD
+from systems.switching.orca_planner import OrcaPlanner
 from systems.switching.perception import Perception
 from systems.switching.signals import NOISE
 from systems.switching.statechart_planner import StatechartPlanner
@@ -104,6 +105,8 @@ def make_planner(scenario: NavigationScenario) -> Any:
     if scenario.planner == "classical":
         classical = replace(scenario.classical, body_radius=radius, speed=speed)
         return ClassicalPlanner(classical)
+    if scenario.planner == "orca":
+        return OrcaPlanner(replace(scenario.orca, body_radius=radius, speed=speed))
     if scenario.planner == "statechart":
         statechart = replace(scenario.statechart, body_radius=radius, speed=speed)
         return StatechartPlanner(statechart)

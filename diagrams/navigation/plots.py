@@ -25,12 +25,14 @@ PLANNER_COLORS = {
     "switching": COLORS["robot"],
     "classical": COLORS["accent"],
     "statechart": COLORS["target"],
+    "orca": COLORS["obstacle"],
 }
 
 
 def state_names(planner: str) -> tuple[str, ...]:
     """Names of a planner's states, by number."""
-    return {"switching": MODES, "statechart": STATES}.get(planner, ("sum of fields",))
+    names = {"switching": MODES, "statechart": STATES, "orca": ("ORCA",)}
+    return names.get(planner, ("sum of fields",))
 
 
 def draw_world(axes: Any, run: Any, moments: int = 5) -> None:

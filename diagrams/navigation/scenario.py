@@ -21,12 +21,13 @@ from systems.perception.grid_mapping import GridMappingParams
 from systems.perception.signals import CELLS
 from systems.perception.tracking import TrackingParams
 from systems.switching.classical_planner import ClassicalParams
+from systems.switching.orca_planner import OrcaParams
 from systems.switching.perception import PerceptionParams
 from systems.switching.statechart_planner import StatechartParams
 from systems.switching.switching_state import SwitchingParams
 from systems.switching.unicycle_control import UnicycleControlParams
 
-PLANNERS = ("switching", "statechart", "classical")
+PLANNERS = ("switching", "statechart", "classical", "orca")
 SENSES = ("given", "lidar")
 
 
@@ -81,6 +82,7 @@ class NavigationScenario(Scenario):
     switching: SwitchingParams = part(SwitchingParams)
     statechart: StatechartParams = part(StatechartParams)
     classical: ClassicalParams = part(ClassicalParams)
+    orca: OrcaParams = part(OrcaParams)
     control: UnicycleControlParams = part(UnicycleControlParams)
 
     def rules(self) -> Rules:

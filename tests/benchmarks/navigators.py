@@ -5,15 +5,13 @@ obstacle that comes within two seconds.
 """
 
 from importlib.util import find_spec
-from math import hypot
 
 import numpy as np
 
-from plants.crowd.orca import orca_velocity
 from plants.crowd.signals import Obstacle
 from plants.crowd.social_force import social_force_towards
-from systems.switching.arcs import Disc, time_to_enter
 from systems.switching.classical_planner import ClassicalParams, summed_fields
+from systems.switching.orca_planner import OrcaParams, orca_step, retreats
 from systems.switching.statechart_planner import (
     Manoeuvre,
     StatechartParams,
@@ -78,13 +76,7 @@ def noisy(position: float = 0.05, velocity: float = 0.1) -> Planner:
 
 
 def _retreats(scene: Scene, now: Now) -> bool:
-    moving = [
-        Disc(o.track, now.x - o.x, now.y - o.y, o.radius, o.v_x, o.v_y)
-        for o in now.seen
-        if o.v_x or o.v_y
-    ]
-    clearance = scene.robot.radius + 2.0 * MARGIN
-    return time_to_enter(0.0, 0.0, moving, clearance) < 2.0
+    return retreats(now.place, now.seen, scene.robot.radius + 2.0 * MARGIN)
 
 
 def classical(scene: Scene) -> Step:
@@ -173,21 +165,17 @@ def crowds(model: str) -> Planner:
 
     def make(scene: Scene) -> Step:
         robot = scene.robot
+        params = OrcaParams(robot.radius, MARGIN, robot.speed)
 
         def step(now: Now) -> Command:
-            me = Obstacle(*now.place, robot.radius + MARGIN, *now.v)
-            others = [Obstacle(*o[1:]) for o in now.seen]
             if model == "social_force":
+                me = Obstacle(*now.place, robot.radius + MARGIN, *now.v)
+                others = [Obstacle(*o[1:]) for o in now.seen]
                 (v,) = social_force_towards(
                     [me, *others], [scene.goal], robot.speed, scene.dt
                 )
                 return *v, _retreats(scene, now)
-            others.sort(key=lambda o: hypot(o.x - now.x, o.y - now.y))
-            gx, gy = scene.goal[0] - now.x, scene.goal[1] - now.y
-            size = max(hypot(gx, gy), 1e-9)
-            pace = min(robot.speed, 2.0 * size) / size
-            wanted = (pace * gx, pace * gy)
-            v = orca_velocity(me, others[:20], wanted, robot.speed, 5.0, scene.dt)
+            v = orca_step(params, now.place, now.v, scene.goal, now.seen, scene.dt)
             return *v, _retreats(scene, now)
 
         return step

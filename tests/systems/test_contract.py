@@ -190,6 +190,7 @@ COMMANDS = {
     "GoToTarget": {"v1": RATE},
     "GuidedTool": {"tip_velocity": RATE},
     "JointCommands": {"posture": HELD, "set_point": HELD},
+    "OrcaPlanner": {"v_R": RATE},
     "PassiveWristEmulation": {"tool": TOOL},
     "ResectionIk": {"posture": HELD},
     "SnakeTask": {"target": HELD},

@@ -15,6 +15,12 @@ from systems.switching.classical_planner import (
     field_sum,
     summed_fields,
 )
+from systems.switching.orca_planner import (
+    OrcaParams,
+    OrcaPlanner,
+    orca_step,
+    retreats,
+)
 from systems.switching.perception import Perception, PerceptionParams, perceive
 from systems.switching.signals import NOISE, SEEN, Mode, Noise, PlanarVelocity, Seen
 from systems.switching.statechart_planner import StatechartPlanner
@@ -125,7 +131,7 @@ def test_bad_control_is_refused():
 @pytest.mark.parametrize("broken", [nan, inf, -inf])
 @pytest.mark.parametrize("name", ["robot", "seen", "goal"])
 @pytest.mark.parametrize(
-    "planner", [ClassicalPlanner, StatechartPlanner, SwitchingPlanner]
+    "planner", [ClassicalPlanner, OrcaPlanner, StatechartPlanner, SwitchingPlanner]
 )
 def test_a_broken_input_stops_the_robot(planner, name, broken):
     dut = planner()
@@ -146,6 +152,19 @@ def test_a_broken_input_stops_the_robot(planner, name, broken):
     assert step().tolist() == [0.0, 0.0]
     dut.GetInputPort(name).FixValue(context, np.ravel(inputs[name]))
     assert step()[0] > 0.1
+
+
+def test_orca_takes_half_of_an_evasion_and_retreats_in_time():
+    """Head on, both as fast: it leaves its line, and may drive backwards."""
+    params, place, goal = OrcaParams(), (0.0, 0.0), (8.0, 0.0)
+    alone = orca_step(params, place, (0.5, 0.0), goal, [], 0.05)
+    assert alone == pytest.approx((0.5, 0.0))
+    come = [Seen(0.0, 2.0, 0.05, 0.3, -0.5, 0.0)]
+    vx, vy = orca_step(params, place, (0.5, 0.0), goal, come, 0.05)
+    assert hypot(vx, vy) <= 0.5 + 1e-9 and vy < -0.03
+    # What comes at 0.5 m/s is within 0.3 + 0.38 m in 1.6 s; in 2.6 s.
+    assert retreats(place, [come[0]._replace(x=1.5)], 0.38)
+    assert not retreats(place, come, 0.38)
 
 
 def test_what_is_not_seen_does_not_matter():
