@@ -4,6 +4,7 @@
 # make test      style, types and all tests, JOBS at a time
 # make golden    the figures of all scenarios against the table of golden ones
 # make bench     benchmarks, side by side (SEED=N for other scenes, ONLY=NAME for one)
+# make docs      the site, in out/site: pages, notebooks run, docstrings, a gallery
 # make notebook  opens the notebooks in Jupyter
 
 PYTHON ?= python3.12
@@ -12,7 +13,10 @@ SEED ?= 1
 JOBS ?= 2
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: setup demo test golden bench notebook clean
+GALLERY := gauze_dynamic gauze_breathing gauze_press pwe_arc_breathing nav_three_moving \
+	nav_crowd snake_circle resect_auto_small keyhole_approach
+
+.PHONY: setup demo test golden bench docs notebook clean
 
 setup: .venv/ready
 
@@ -46,6 +50,12 @@ golden: setup
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks --seed $(SEED) $(ONLY)
+
+docs: setup $(GALLERY:%=out/%/replay.html)
+	$(BIN)/python -m diagrams.site.build out/site --notebooks --runs $(GALLERY:%=out/%)
+
+out/%/replay.html: | setup
+	$(BIN)/trocar run $*
 
 notebook: setup
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt jupyterlab

@@ -1,6 +1,6 @@
 """A small fuzzy engine: triangles, a rule table as data, weighted average.
 
-A rule table is a list of rows of labels, as papers print it: cell [i][j] is
+A rule table is a list of rows of labels, as papers print it: cell i, j is
 the conclusion of "row variable is its i-th label and column variable is its
 j-th label". AND is the minimum, rules of equal conclusion are joined by the
 maximum, and a conclusion is a number or a vector (zero-order Sugeno): the

@@ -1,0 +1,84 @@
+"""The site: it builds without a warning, and its links lead somewhere."""
+
+from pathlib import Path
+import re
+
+import pytest
+
+from diagrams.site import build
+from diagrams.site.docstrings import listed, meaning
+
+
+def test_links_to_folders_lead_to_their_pages():
+    taken = set(build.pages())
+    page = Path("diagrams/gauze/README.md")
+    text = "[a](../wrist/) [b](inside.md#x) [c](replay.jpg) [d](../../README.md)"
+    assert build.relinked(text, page, taken) == (
+        "[a](../wrist/README.md) [b](inside.md#x) [c](replay.jpg) "
+        "[d](../../overview.md)"
+    )
+    far = "[e](https://drake.mit.edu) [f](study.py)"
+    assert build.relinked(far, page, taken) == "[e](https://drake.mit.edu) [f](#)"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site")
+    run = folder / "runs" / "some_run"
+    run.mkdir(parents=True)
+    (run / "replay.html").write_text("<p>moves</p>")
+    picture = build.ROOT / "diagrams" / "navigation" / "ways.png"
+    (run / "way_there.png").write_bytes(picture.read_bytes())
+    return build.build_site(folder / "out", [run]).parent
+
+
+def test_it_builds_without_a_warning(site):
+    """Every room is there, and what a page shows is, too."""
+    front = (site / "index.html").read_text()
+    assert '<iframe src="gallery/some_run/replay.html"' in front
+    for floor in build.FLOORS:
+        for room in build.rooms_of(floor):
+            assert (site / room / "index.html").exists()
+            assert (site / "reference" / ".".join(room.parts) / "index.html").exists()
+    for notebook in (build.ROOT / "notebooks").glob("*.ipynb"):
+        assert (site / "notebooks" / notebook.stem / "index.html").exists()
+    gallery = (site / "gallery" / "index.html").read_text()
+    assert "some_run/way_there.png" in gallery and "some_run/replay.html" in gallery
+    assert (site / "gallery" / "some_run" / "replay.html").exists()
+
+
+def test_nothing_is_fetched_from_elsewhere(site):
+    """But for the sums of notebooks, whose pages say where they have MathJax from."""
+    for page in ("index.html", "systems/motion/index.html"):
+        text = (site / page).read_text()
+        found = re.findall(
+            r'<(?:script|link|img)[^>]+(?:src|href)="(https?:[^"]+)"', text
+        )
+        assert not [url for url in found if "canonical" not in url]
+
+
+def test_the_reference_has_ports_and_units(site):
+    text = (site / "reference" / "systems.motion" / "index.html").read_text()
+    assert re.search(r"<li>\s*(<p>)?Port <code>tool</code> accepts", text)
+    assert "greatest speed of the tip [m/s]" in text
+
+
+def test_a_dead_link_is_an_error(tmp_path, monkeypatch):
+    every = sorted(build.pages())
+    few = [p for p in every if p.suffix == ".md" and p.parts[0] not in build.FLOORS]
+    own = [p for p in every if p.is_relative_to(build.OWN)]
+    monkeypatch.setattr(build, "FLOORS", {})
+    monkeypatch.setattr(build, "pages", lambda: [*few, *own])
+    monkeypatch.setattr(build, "relinked", lambda text, *rest: text + "\n[x](no.md)\n")
+    with pytest.raises(build.SiteError, match=r"no\.md"):
+        build.build_site(tmp_path / "out", rooms=[])
+
+
+def test_ports_are_a_list_and_parameters_have_a_meaning():
+    text = "A block.\n\nPort ``a`` accepts x\nand y.\nPort ``b`` emits z.\n\nEnd."
+    assert listed(text) == (
+        "A block.\n\n\n- Port ``a`` accepts x\n  and y.\n- Port ``b`` emits z.\n\nEnd."
+    )
+    assert meaning("parameter(0.5, 'of it', 'm', least=0)") == "of it [m]"
+    assert meaning("parameter('a', 'which', choices=KINDS)") == "which"
+    assert meaning("3") == "" and meaning("part(Params)") == ""
