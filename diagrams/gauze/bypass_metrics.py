@@ -23,13 +23,14 @@ def bypass_figures(
     """
     time = run.signals["time"]
     status = run.planner.clearance
-    near = status.near > 0.5
-    # Of a hand that the tracker has lost nobody knows how fast it comes.
-    known = [
-        run.signals[f"{tool.name}.estimate.known"] > 0.5
-        for tool in run.case.scenario.of_role(OBSTACLE)
-    ]
-    held = (np.all(known, axis=0) & (status.condition > 0.5))[near]
+    near, held = status.near > 0.5, status.condition > 0.5
+    constraint = run.case.scenario.clearance_constraint
+    for tool in run.case.scenario.of_role(OBSTACLE):
+        # How fast a hand comes that the tracker has lost nobody knows.
+        lost = run.signals[f"{tool.name}.estimate.known"] < 0.5
+        close = gap(run, OBSTACLE) < constraint.obstacle_speed / constraint.rate
+        near, held = near | (lost & close), held & ~lost
+    held = held[near]
     approach = tip_error > HAND_OVER
     to_target = gap(run, "target")[approach]
     figures = {

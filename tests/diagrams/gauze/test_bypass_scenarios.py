@@ -30,6 +30,11 @@ def test_no_contact_and_the_condition_held(name):
     json.dumps(figures, allow_nan=False)
 
 
+def test_the_condition_does_not_hold_of_a_hand_out_of_sight():
+    figures = run("gauze_lost_sight").metrics  # for a part of 1.25 s, near O
+    assert 0.8 < figures["evasion_condition_held"] < 0.95
+
+
 def test_crossed_is_passed_where_the_paper_stalls():
     figures = run("gauze_crossed").metrics
     assert figures["min_tool_clearance"] >= 0.002
