@@ -64,7 +64,8 @@ def orca_step(
         obstacles: The obstacles in sight.
         dt: Time in which discs that overlap must separate [s].
     """
-    (x, y), (gx, gy) = place, (goal[0] - place[0], goal[1] - place[1])
+    (x, y), (goal_x, goal_y) = place, goal
+    gx, gy = goal_x - x, goal_y - y
     me = Obstacle(x, y, params.body_radius + params.margin, *v)
     others = [Obstacle(*one[1:]) for one in obstacles]
     others.sort(key=lambda one: hypot(one.x - x, one.y - y))
