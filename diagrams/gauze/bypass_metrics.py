@@ -24,10 +24,11 @@ def bypass_figures(
     time = run.signals["time"]
     status = run.planner.clearance
     near, held = status.near > 0.5, status.condition > 0.5
-    constraint = run.case.scenario.clearance_constraint
-    for tool in run.case.scenario.of_role(OBSTACLE):
-        # How fast a hand comes that the tracker has lost nobody knows.
-        lost = run.signals[f"{tool.name}.estimate.known"] < 0.5
+    scenario, lost = run.case.scenario, np.zeros(len(time), bool)
+    for tool in scenario.of_role(OBSTACLE):
+        lost |= run.signals[f"{tool.name}.estimate.known"] < 0.5
+    if lost.any():  # how fast a hand comes that the tracker has lost nobody knows
+        constraint = scenario.clearance_constraint
         close = gap(run, OBSTACLE) < constraint.obstacle_speed / constraint.rate
         near, held = near | (lost & close), held & ~lost
     held = held[near]

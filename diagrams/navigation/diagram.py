@@ -1,6 +1,6 @@
 """The diagram of a navigation: perception, planning, action (the thesis's Figure 1)."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -99,21 +99,23 @@ SENSED_EXPORTS = {
 """What else, where the robot sees for itself."""
 
 
+PEERS: dict[str, Callable[[Any], Any]] = {
+    "classical": ClassicalPlanner,
+    "orca": OrcaPlanner,
+    "statechart": StatechartPlanner,
+}
+"""Planners that need no more of the scenario than their own part."""
+
+
 def make_planner(scenario: NavigationScenario) -> Any:
     """The planner that the scenario names; its body and limits are the robot's."""
     radius, speed = scenario.robot.radius, scenario.robot.speed
-    if scenario.planner == "classical":
-        classical = replace(scenario.classical, body_radius=radius, speed=speed)
-        return ClassicalPlanner(classical)
-    if scenario.planner == "orca":
-        return OrcaPlanner(replace(scenario.orca, body_radius=radius, speed=speed))
-    if scenario.planner == "statechart":
-        statechart = replace(scenario.statechart, body_radius=radius, speed=speed)
-        return StatechartPlanner(statechart)
+    params = getattr(scenario, scenario.planner)  # each has a part of its name
+    params = replace(params, body_radius=radius, speed=speed)
+    if scenario.planner in PEERS:
+        return PEERS[scenario.planner](params)
     switching = replace(
-        scenario.switching,
-        body_radius=radius,
-        speed=speed,
+        params,
         vision=scenario.perception.vision,
         braking=scenario.robot.acceleration,
         # What stands must not seem to move by the noise of its measured velocity.

@@ -31,8 +31,8 @@ PLANNER_COLORS = {
 
 def state_names(planner: str) -> tuple[str, ...]:
     """Names of a planner's states, by number."""
-    names = {"switching": MODES, "statechart": STATES, "orca": ("ORCA",)}
-    return names.get(planner, ("sum of fields",))
+    alone = {"classical": ("sum of fields",), "orca": ("ORCA",)}
+    return (alone | {"switching": MODES, "statechart": STATES})[planner]
 
 
 def draw_world(axes: Any, run: Any, moments: int = 5) -> None:

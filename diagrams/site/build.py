@@ -15,6 +15,9 @@ import shutil
 import sys
 from typing import Any
 
+from diagrams.common.cli import extra
+from diagrams.common.scenario import ScenarioError
+
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
 FLOORS = {
@@ -29,8 +32,12 @@ OWN = Path("diagrams/site/pages")
 """What is written for the site alone."""
 
 
+MARK = ".site"
+"""File in a folder that was made here, and may be made anew."""
+
+
 class SiteError(RuntimeError):
-    """What MkDocs had to say."""
+    """What MkDocs had to say, or what is wrong with what was asked."""
 
 
 class Said(logging.Handler):
@@ -115,9 +122,14 @@ def write_gallery(folder: Path, runs: Sequence[Path]) -> str:
 
     Returns:
         The first replay, to be shown on the front page; "" without one.
+
+    Raises:
+        SiteError: If one is no folder of results.
     """
     lines, first = ["# Gallery\n", "Replays are one file each: open, turn, play.\n"], ""
     for run in runs:
+        if not (run / "metrics.json").exists():
+            raise SiteError(f"{run}: expected results of a run, see `trocar run`")
         there = folder / run.name
         there.mkdir(parents=True, exist_ok=True)
         lines.append(f"## {run.name}\n")
@@ -195,16 +207,20 @@ def build_site(
         Its front page.
 
     Raises:
-        ImportError: Without the extra `docs`.
-        SiteError: If there was a warning, a dead link for example.
+        ModuleNotFoundError: Without the extra `docs`.
+        SiteError: If there was a warning, a dead link for example, or if the folder
+            holds something else.
     """
     from mkdocs.commands.build import build
     from mkdocs.config import load_config
     from mkdocs.exceptions import Abort
 
     pages_, site = out / "pages", out / "site"
+    if out.exists() and any(out.iterdir()) and not (out / MARK).exists():
+        raise SiteError(f"{out}: expected a new folder, or one of an earlier site")
     shutil.rmtree(out, ignore_errors=True)
     copy_pages(pages_)
+    (out / MARK).touch()
     (pages_ / "reference").mkdir()
     if rooms is None:
         rooms = [room for floor in FLOORS for room in rooms_of(floor)]
@@ -256,8 +272,9 @@ def main() -> None:
     parser.add_argument("--notebooks", action="store_true", help="run them for it")
     told = parser.parse_args()
     try:
-        print(build_site(told.out, told.runs, notebooks=told.notebooks))
-    except SiteError as error:
+        with extra("docs"):
+            print(build_site(told.out, told.runs, notebooks=told.notebooks))
+    except (SiteError, ScenarioError) as error:
         sys.exit(f"the site: {error}")
 
 

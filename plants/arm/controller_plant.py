@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 
@@ -34,3 +35,19 @@ def make_controller_plant(
     add_instrument(plant, plant.GetFrameByName("flange", arm), instrument)
     plant.Finalize()
     return plant
+
+
+def accelerations(plant: Any, q: np.ndarray) -> np.ndarray:
+    """What each joint alone can do with its rated torque, the others at rest.
+
+    Args:
+        plant: Of `make_controller_plant`.
+        q: Posture (7) [rad].
+
+    Returns:
+        In rad/s^2 (7).
+    """
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q)
+    inertia = plant.CalcMassMatrix(context)
+    return np.array(plant.GetEffortUpperLimits() / np.diag(inertia))

@@ -6,13 +6,18 @@ speeds, see `joint_velocity`.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi, sin
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from plants.arm.arm import ArmParams, SetPoint
-from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
+from plants.arm.controller_plant import (
+    INSTRUMENT_TIP,
+    accelerations,
+    make_controller_plant,
+)
 from plants.arm.parameters import JOINTS, READY_POSTURE
 from plants.arm.signals import ArmState, Posture
 from plants.instruments.instrument import InstrumentParams
@@ -295,22 +300,6 @@ def _free_step(
     return command(constants, q, v, weight, shortfall) + (0.0, v, is_free)
 
 
-def accelerations(plant: Any, q: np.ndarray) -> np.ndarray:
-    """What each joint alone can do with its rated torque, the others at rest.
-
-    Args:
-        plant: The arm alone, with its instrument.
-        q: Posture (7) [rad].
-
-    Returns:
-        In rad/s^2 (7).
-    """
-    context = plant.CreateDefaultContext()
-    plant.SetPositions(context, q)
-    inertia = plant.CalcMassMatrix(context)
-    return np.array(plant.GetEffortUpperLimits() / np.diag(inertia))
-
-
 class JointCommands(Block):
     """Follows the commanded tool pose with the arm's seven joints.
 
@@ -365,7 +354,8 @@ class JointCommands(Block):
         signals = {"posture": Posture, "set_point": ArmState, "status": Status}
         sizes = [*map(size, signals.values()), 1, JOINTS, 1]
         told = [ToolMotion, Point, ArmState, Permission]
-        self._places = np.cumsum(sizes)[:-1]
+        ends = np.cumsum([0, *sizes]).tolist()
+        self._parts = [slice(*pair) for pair in pairwise(ends)]
         self._step = wired(_free_step, 2, [JOINTS, 1, JOINTS], told, sizes, True)
         self._tool = self.signal_in("tool", ToolMotion)
         self._fulcrum = self.signal_in("fulcrum", Point)
@@ -404,7 +394,7 @@ class JointCommands(Block):
         step = self._step(
             constants, arm, q, rest, before, time, tool, fulcrum, measured, permission
         )
-        *given, final = np.split(step, self._places)
+        *given, final = [step[part] for part in self._parts]
         if final[0]:
             return given
         J, V, *bounds, weight = _problem(constants, arm, q, before, time, tool, fulcrum)

@@ -11,7 +11,8 @@ from math import hypot
 from typing import Any
 
 from plants.turtlebot.turtlebot import RobotState
-from systems.common.parameter import check, parameter
+from systems.common.parameter import parameter
+from systems.switching.body import BodyParams
 from systems.switching.fields import (
     attractive_field,
     printed_attractive_field,
@@ -26,7 +27,7 @@ ATTRACTIONS = ("gradient", "printed")
 
 
 @dataclass
-class ClassicalParams:
+class ClassicalParams(BodyParams):
     """Parameters of the sum of potentials."""
 
     form: str = parameter(
@@ -43,8 +44,6 @@ class ClassicalParams:
     )
     # Khatib's saturation is not in the thesis, and makes zeros of the sum of its own.
     clipped: bool = parameter(True, "whether the attraction alone is limited to speed")
-    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
-    speed: float = parameter(0.5, "greatest, of the sum", "m/s", above=0.0, most=3.0)
     gain: float = parameter(1.0, "attraction per distance", "1/s", above=0.0, most=20.0)
     repulsion: float = parameter(
         0.01, "eta of Khatib's equation", "m^4/s", above=0.0, most=1.0
@@ -130,10 +129,7 @@ class ClassicalPlanner(NavigationPlanner):
         Raises:
             ParameterError: If a parameter is out of range.
         """
-        super().__init__()
-        self.params = params or ClassicalParams()
-        check(self.params)
-        self.declare(period)
+        super().__init__(params or ClassicalParams(), period)
 
     def plan(
         self,

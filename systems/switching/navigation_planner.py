@@ -10,6 +10,7 @@ import numpy as np
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled
+from systems.common.parameter import check
 from systems.common.signal import reader, size
 from systems.switching.signals import (
     CORNERS,
@@ -60,13 +61,19 @@ class NavigationPlanner(Block):
     Where an input is not finite, the robot is to stand.
     """
 
-    def declare(self, period: float, *memory: Any) -> None:
+    def __init__(self, params: Any, period: float, *memory: Any) -> None:
         """Declares ports, state and update.
 
         Args:
+            params: A dataclass of the planner's parameters.
             period: In s.
             memory: What the planner remembers at first: named tuples of numbers.
+
+        Raises:
+            ParameterError: If a parameter is out of range.
         """
+        super().__init__()
+        self.params, self.period = check(params), period
         self._robot = self.signal_in("robot", RobotState)
         self._seen = self.signal_in("seen", SEEN)
         self._goal = self.signal_in("goal", Goal)

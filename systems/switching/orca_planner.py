@@ -13,8 +13,9 @@ from typing import Any
 from plants.crowd.orca import orca_velocity
 from plants.crowd.signals import Obstacle
 from plants.turtlebot.turtlebot import RobotState
-from systems.common.parameter import check, parameter
+from systems.common.parameter import parameter
 from systems.switching.arcs import Disc, time_to_enter
+from systems.switching.body import BodyParams
 from systems.switching.navigation_planner import (
     PERIOD,
     NavigationPlanner,
@@ -30,14 +31,12 @@ _SOON = 2.0
 
 
 @dataclass
-class OrcaParams:
+class OrcaParams(BodyParams):
     """Parameters of ORCA."""
 
-    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
     margin: float = parameter(
         0.1, "distance to keep from obstacles' surfaces", "m", least=0.0, most=2.0
     )
-    speed: float = parameter(0.5, "of the body", "m/s", above=0.0, most=3.0)
     gain: float = parameter(
         2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
     )
@@ -106,10 +105,7 @@ class OrcaPlanner(NavigationPlanner):
         Raises:
             ParameterError: If a parameter is out of range.
         """
-        super().__init__()
-        self.params, self._period = params or OrcaParams(), period
-        check(self.params)
-        self.declare(period)
+        super().__init__(params or OrcaParams(), period)
 
     def plan(
         self,
@@ -121,7 +117,7 @@ class OrcaPlanner(NavigationPlanner):
     ) -> Planned:
         """The velocity to take; nothing is remembered."""
         params, place = self.params, (robot.x, robot.y)
-        v = orca_step(params, place, velocity(robot), goal, seen, self._period)
+        v = orca_step(params, place, velocity(robot), goal, seen, self.period)
         clearance = params.body_radius + 2.0 * params.margin
         back = float(retreats(place, seen, clearance))
         return Planned(PlanarVelocity(*v), Mode(retreat=back))

@@ -14,7 +14,8 @@ from math import acos, atan2, cos, hypot, sin
 from typing import Any, NamedTuple
 
 from plants.turtlebot.turtlebot import RobotState
-from systems.common.parameter import check, parameter
+from systems.common.parameter import parameter
+from systems.switching.body import BodyParams
 from systems.switching.fields import attractive_field, helicoid_field
 from systems.switching.navigation_planner import PERIOD, NavigationPlanner, Planned
 from systems.switching.signals import Corner, Goal, Mode, PlanarVelocity, Seen
@@ -24,14 +25,12 @@ STATES = ("attractive", "about Omega", "about the obstacle")
 
 
 @dataclass
-class StatechartParams:
+class StatechartParams(BodyParams):
     """Parameters of the statechart."""
 
-    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
     margin: float = parameter(
         0.15, "distance to keep from obstacles' surfaces", "m", least=0.02, most=2.0
     )
-    speed: float = parameter(0.5, "of the body", "m/s", above=0.0, most=3.0)
     gain: float = parameter(
         2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
     )
@@ -197,10 +196,7 @@ class StatechartPlanner(NavigationPlanner):
         Raises:
             ParameterError: If a parameter is out of range.
         """
-        super().__init__()
-        self.params = params or StatechartParams()
-        check(self.params)
-        self.declare(period, Manoeuvre())
+        super().__init__(params or StatechartParams(), period, Manoeuvre())
 
     def plan(
         self,

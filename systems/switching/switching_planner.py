@@ -3,7 +3,6 @@
 from typing import Any
 
 from plants.turtlebot.turtlebot import RobotState
-from systems.common.parameter import check
 from systems.switching.navigation_planner import (
     PERIOD,
     NavigationPlanner,
@@ -37,10 +36,9 @@ class SwitchingPlanner(NavigationPlanner):
         Raises:
             ParameterError: If a parameter is out of range.
         """
-        super().__init__()
-        self.params = params or SwitchingParams()
-        check(self.params)
-        self.declare(period, Goal(0.0, 0.0), SwitchingState())
+        super().__init__(
+            params or SwitchingParams(), period, Goal(0.0, 0.0), SwitchingState()
+        )
 
     def plan(
         self,

@@ -5,6 +5,7 @@ from math import inf, pi
 from typing import NamedTuple
 
 from systems.common.parameter import Rules, parameter
+from systems.switching.body import BodyParams
 
 ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
 MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
@@ -12,11 +13,9 @@ MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
 
 
 @dataclass
-class SwitchingParams:
+class SwitchingParams(BodyParams):
     """Parameters of the switching planner; the defaults are a TurtleBot's."""
 
-    body_radius: float = parameter(0.18, "of the body", "m", least=0.05, most=1.0)
-    speed: float = parameter(0.5, "of the body", "m/s", above=0.0, most=3.0)
     vision: float = parameter(3.0, "radius of vision R_v", "m", above=0.0, most=100.0)
     margins: list[float] = parameter(
         [0.2, 0.1],

@@ -34,11 +34,10 @@ class HrvoPlanner(NavigationPlanner):
 
     def __init__(self, scenario: Any) -> None:
         """Makes the block for the scenario's robot and goal."""
-        super().__init__()
+        super().__init__(scenario.robot, PERIOD)
         robot = Robot(scenario.robot.radius, scenario.robot.speed)
         ends = (*scenario.start,), (*scenario.goal,)
         self._step = hrvo(Scene("", *ends, lambda step: [], robot, PERIOD))
-        self.declare(PERIOD)
 
     def plan(
         self,

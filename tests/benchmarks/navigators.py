@@ -165,7 +165,7 @@ def crowds(model: str) -> Planner:
 
     def make(scene: Scene) -> Step:
         robot = scene.robot
-        params = OrcaParams(robot.radius, MARGIN, robot.speed)
+        params = OrcaParams(robot.radius, robot.speed, MARGIN)
 
         def step(now: Now) -> Command:
             if model == "social_force":

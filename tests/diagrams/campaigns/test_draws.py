@@ -113,3 +113,12 @@ def test_the_probe_swings_no_shaft_into_one_that_stands():
     job = campaign.job(base_of(campaign), 201, "", Tape([1, 201]))
     job["overrides"]["duration"] = 1.8
     assert scenario(job)["min_tool_clearance"] > 0.0015
+
+
+def test_every_run_of_a_crowd_has_a_world_of_its_own():
+    campaign = load_campaign("crowd", runs=20)
+    jobs = campaign.jobs(base_of(campaign), set())
+    seeds = [
+        job["overrides"]["crowd.seed"] for job in jobs if job["variant"] == "exact"
+    ]
+    assert len(set(seeds)) == len(seeds) == 20

@@ -10,7 +10,11 @@ from pydrake.systems.analysis import Simulator
 import pytest
 
 from plants.arm.arm import SetPoint
-from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
+from plants.arm.controller_plant import (
+    INSTRUMENT_TIP,
+    accelerations,
+    make_controller_plant,
+)
 from plants.arm.parameters import READY_POSTURE
 from systems.common.signal import flat, size, vector
 from systems.common.signals import Permission, ToolMotion
@@ -168,7 +172,7 @@ def test_joints_change_speed_no_faster_than_their_torque_allows():
         tip, u, still = (0.02, 0.0, -0.12), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)
         return ToolMotion(tip, u, still, still, t)
 
-    most = joint_commands.accelerations(PLANT, np.array(READY_POSTURE)) * PERIOD
+    most = accelerations(PLANT, np.array(READY_POSTURE)) * PERIOD
 
     def leaping(share):
         rows = follow(leap, 1.0, JointCommandsParams(joint_torque=share))
