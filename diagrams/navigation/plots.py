@@ -25,7 +25,7 @@ PLANNER_COLORS = {
     "switching": COLORS["robot"],
     "classical": COLORS["accent"],
     "statechart": COLORS["target"],
-    "orca": COLORS["obstacle"],
+    "orca": COLORS["camera"],
 }
 
 
