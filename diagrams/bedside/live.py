@@ -45,7 +45,11 @@ class Cough:
         """Presses it."""
         motion, start = session.scenario.wall_motion, session.time + SOON
         motion.irregular.coughs = [*motion.irregular.coughs, start]
-        self._course.change(motion, start, start + COUGH + 0.1)
+        self.throw(session, start, start + COUGH + 0.1)
+
+    def throw(self, session: Any, start: float, end: float) -> None:
+        """Changes what moves, from a time to another in s."""
+        self._course.change(session.scenario.wall_motion, start, end)
         source = session.station.GetSubsystemByName("wall_motion")
         source.UpdateTrajectory(self._course.trajectory)
 

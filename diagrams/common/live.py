@@ -103,6 +103,7 @@ class Live:
         tracked: What of a scenario a tracker may see: as guided by another program.
         streamed: What other programs are told: by name a point and a direction
             (None for none), or a text.
+        frame: Between two looks at what is outside [s], on the controllers' clock.
     """
 
     guided: Callable[[Any], list[Guided]] = lambda scenario: []
@@ -114,3 +115,4 @@ class Live:
     moving: Callable[[Any], Any] | None = None
     tracked: Callable[[Any], list[Guided]] = lambda scenario: []
     streamed: Callable[[Any], dict[str, Any]] = lambda session: {}
+    frame: float = 1.0 / 60.0

@@ -107,6 +107,9 @@ def clearance(session: Any) -> float:
     return float(session.values("clearance").min())
 
 
+CLEARANCE = Figure("clearance [mm]", clearance, -5.0, 100.0)
+
+
 def streamed(session: Any) -> dict[str, Any]:
     """The robot's tool, the surgeon's, the wall's force, and why the robot stands."""
     told: dict[str, Any] = {"RobotTool": tool_of_robot(session)}
@@ -120,10 +123,7 @@ LIVE = Live(
     held=held,
     switches=switches,
     acts=acts,
-    figures=lambda scenario: [
-        Figure("clearance [mm]", clearance, -5.0, 100.0),
-        WALL,
-    ],
+    figures=lambda scenario: [CLEARANCE, WALL],
     words=lambda session: stop_of(session.read("navigation.stop", StopCode).code),
     moving=lambda session: session.read("robot.tool", RobotTool).tip,
     tracked=tracked,

@@ -23,16 +23,13 @@ from diagrams.common.scenario import ScenarioError, refusals
 from diagrams.live.page import Page
 from diagrams.studies import STUDIES, build, check_scenario, get_study
 from plants.faults.fault import Fault
-from systems.common.outside import PERIOD
 from systems.common.signal import flat, view
 from systems.common.tape import save_tape
 
-FRAME = PERIOD
-"""Between two looks at what is outside [s]."""
-DRAWN = 2
-"""Frames between two that are drawn."""
-READ = 6
-"""Frames between two updates of the figures: ten a second."""
+DRAWN = 1.0 / 30.0
+"""Between two pictures, and what other programs are told [s]."""
+READ = 0.1
+"""Between two updates of the figures [s]."""
 NEVER = 1e5
 """When a fault begins that nobody has asked for [s]."""
 USUAL = ("pause", "reset", "another seed", "end and save")
@@ -57,7 +54,8 @@ class Session:
     """One go at a scenario; `frame` steps it, `save` keeps what was done.
 
     Attributes:
-        scenario: What runs, whatever moves by itself what is guided taken away.
+        case: What runs, prepared.
+        scenario: Its scenario, whatever moves by itself what is guided taken away.
         time: Simulated [s].
         speed: Of the robot [m/s].
         is_paused: Whether time stands.
@@ -85,6 +83,10 @@ class Session:
             able = ", ".join(name for name, other in STUDIES.items() if other.live)
             raise ScenarioError(f"system={study.name!r}: expected one of {able}")
         self._study, self._live = study, study.live
+        self._every = {
+            seconds: max(1, round(seconds / study.live.frame))
+            for seconds in (DRAWN, READ)
+        }
         self._page, self._tracker, self._stream = page, tracker, stream
         self.is_paused = self.is_over = False
         self.lag: list[float] = []
@@ -111,9 +113,9 @@ class Session:
         check_scenario(played)
         self.scenario = played
         with refusals():
-            self._case = self._study.prepare(played, silent)
+            self.case = self._study.prepare(played, silent)
         builder = DiagramBuilder()
-        self.station = builder.AddNamedSystem("station", build(self._case))
+        self.station = builder.AddNamedSystem("station", build(self.case))
         self._visualizer = None
         if self._page and self.station.HasOutputPort(QUERY_PORT):
             self._visualizer = MeshcatVisualizer.AddToBuilder(
@@ -179,24 +181,28 @@ class Session:
             return
         self._hear()
         self._count += 1
-        self.time = self._count * FRAME
-        if self._count % 2:
-            self._study.adjust(self._case, self.station, self._context)
+        self.time = self._count * self._live.frame
+        if self._is_due(DRAWN, 1):
+            self._study.adjust(self.case, self.station, self._context)
         self._simulator.AdvanceTo(self.time)
         if self._live.moving:
             point = np.array(self._live.moving(self))
-            self.speed = float(np.linalg.norm(point - self._point)) / FRAME
+            self.speed = float(np.linalg.norm(point - self._point)) / self._live.frame
             self._point = point
-        if self._count % DRAWN == 0:
+        if self._is_due(DRAWN):
             self._draw()
             self._tell()
-        if self._count % READ == 0:
+        if self._is_due(READ):
             self._show()
+
+    def _is_due(self, seconds: float, since: int = 0) -> bool:
+        """Whether something is to be done that comes so often, `since` frames later."""
+        return (self._count - since) % self._every[seconds] == 0
 
     def _hear(self) -> None:
         """Says in the diagram what people and other programs say."""
         if self._page:
-            self._page.move_by_gamepad(FRAME)
+            self._page.move_by_gamepad(self._live.frame)
         for one in self._guided:
             before = self.wanted(one.name)
             if one.sliders and self._page:
@@ -274,7 +280,7 @@ class Session:
         due = perf_counter()
         while self.time < duration - 1e-9 and not self.is_over:
             self.frame()
-            due += FRAME / speed
+            due += self._live.frame / speed
             late = perf_counter() - due
             self.lag.append(max(0.0, late))
             if late < 0.0:

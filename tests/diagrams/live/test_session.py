@@ -12,9 +12,11 @@ from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.live import clearance
 from diagrams.live.page import OTHER, Page
-from diagrams.live.session import FRAME, Session, spans
+from diagrams.live.session import Session, spans
 from diagrams.studies import get_study, load_scenario
 from systems.common.signals import RobotTool, Shaft
+
+FRAME = get_study("gauze").live.frame
 
 
 @pytest.fixture(scope="module")
