@@ -62,7 +62,8 @@ def live_command(arguments: argparse.Namespace) -> Run:
     with links(arguments, scenario) as found:
         meshcat = start_meshcat(arguments.host)
         session = Session(scenario, Page(meshcat), **found)
-        print(f"{meshcat.web_url()}  (Ctrl-C ends it and keeps what was done)")
+        print(f"{meshcat.web_url()}  (Open Controls, at its top right)")
+        print("Ctrl-C, or its button, ends it and keeps what was done.")
         webbrowser.open(meshcat.web_url())
         return played(session, arguments.speed, arguments.out or Path("out") / "live")
 

@@ -181,7 +181,7 @@ class Session:
             return
         self._hear()
         self._count += 1
-        self.time = self._count * self._live.frame
+        self.time = self._due()
         if self._is_due(DRAWN, 1):
             self._study.adjust(self.case, self.station, self._context)
         self._simulator.AdvanceTo(self.time)
@@ -194,6 +194,17 @@ class Session:
             self._tell()
         if self._is_due(READ):
             self._show()
+
+    def _due(self) -> float:
+        """When the frame ends [s].
+
+        Every so often it is a frame of the replay, whose time is taken to the last
+        digit: the integrator takes a step for a difference of that.
+        """
+        shown = 1.0 / self._study.frame_rate
+        every = max(1, round(shown / self._live.frame))
+        frames, rest = divmod(self._count, every)
+        return self._count * self._live.frame if rest else frames * shown
 
     def _is_due(self, seconds: float, since: int = 0) -> bool:
         """Whether something is to be done that comes so often, `since` frames later."""
@@ -310,6 +321,7 @@ class Session:
         for switch, starts in zip(self._switches, self._struck, strict=True):
             faults += [
                 Fault(switch.kind, start, end - start, switch.size)
-                for start, end in spans(starts, switch.lasting)
+                # One that never was stays: its samples end the integrator's steps.
+                for start, end in spans(starts or [NEVER], switch.lasting)
             ]
         return replace(played, duration=self.time, faults=faults)

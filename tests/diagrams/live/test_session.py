@@ -12,7 +12,7 @@ from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.live import clearance
 from diagrams.live.page import OTHER, Page
-from diagrams.live.session import Session, spans
+from diagrams.live.session import NEVER, Session, spans
 from diagrams.studies import get_study, load_scenario
 from systems.common.signals import RobotTool, Shaft
 
@@ -94,7 +94,8 @@ def test_what_was_played_runs_again(played):
     # The same run, to the last digit.
     np.testing.assert_array_equal(run.robot.tool.tip[-1], robot(session))
     # What failed is in it.
-    assert [fault.kind for fault in scenario.faults] == ["frame_lost", "fulcrum_aside"]
+    kinds = [fault.kind for fault in scenario.faults if fault.start < NEVER]
+    assert kinds == ["frame_lost", "fulcrum_aside"]
     assert scenario.faults[0].duration == pytest.approx(1.75)
     assert len(scenario.wall_motion.irregular.coughs) == 1
     speeds = np.linalg.norm(run.obstacle.tip_velocity.v, axis=1)
