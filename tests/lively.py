@@ -8,10 +8,14 @@ import numpy as np
 
 from diagrams.common.replay import start_meshcat
 from diagrams.common.run import simulate
+from diagrams.connect.address import Address
+from diagrams.connect.messages import HEADER
+from diagrams.connect.stream import pose, text
 from diagrams.live.page import Page
 from diagrams.live.session import Session
 from diagrams.studies import load_scenario
 
+HERE = Address("localhost", 0)
 START = {"seed": 4, "duration": 20.0}
 
 
@@ -36,6 +40,10 @@ def play(
         if frame in presses:
             session.press(presses[frame])
         session.frame()
+    for name, told in session._live.streamed(session).items():
+        is_text = isinstance(told, str)
+        message = text(name, told) if is_text else pose(name, HERE, *told)
+        assert len(message.pack()) > HEADER
 
 
 def assert_plays_back(session: Session, port: str, folder: Path) -> Any:

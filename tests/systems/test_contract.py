@@ -13,6 +13,7 @@ import pytest
 
 from diagrams.studies import STUDIES, build, load_scenario
 import plants
+from plants.crowd.guided_disc import GuidedDisc
 from plants.surgeon.guided_tool import GuidedTool
 from plants.surgeon.led_tool import LedTool
 from plants.surgeon.tracked_tool import TrackedTool
@@ -36,7 +37,7 @@ def all_blocks(package) -> list[type]:
     return sorted(found, key=lambda kind: kind.__name__)
 
 
-ALONE = [GuidedTool, TrackedTool]
+ALONE = [GuidedDisc, GuidedTool, TrackedTool]
 """Of the plants' floor, but needing none; in a diagram while somebody guides them."""
 BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
