@@ -47,11 +47,22 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="KEY.SUB=VALUE",
         help="change a value of the scenario, e.g. abdomen.stiffness=800; repeatable",
     )
+    linked = argparse.ArgumentParser(add_help=False)
+    linked.add_argument(
+        "--tracker",
+        metavar="igtl://HOST:PORT",
+        help="tools are where a tracker of PLUS or 3D Slicer sees them; real time",
+    )
+    linked.add_argument(
+        "--stream",
+        metavar="igtl://:PORT",
+        help="tell 3D Slicer and others where everything is; real time",
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("scenarios", help="list the scenarios, one line each")
     run = commands.add_parser(
         "run",
-        parents=[changed, seeded],
+        parents=[changed, seeded, linked],
         help="run a scenario and write figures, plots, log and replay",
         description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
         "PNG, replay.html, report.html and scenario.yaml (exactly what ran) into DIR.",
@@ -82,11 +93,11 @@ def make_parser() -> argparse.ArgumentParser:
     )
     live = commands.add_parser(
         "live",
-        parents=[named, changed, seeded],
-        help="run a gauze scenario in real time and take part in the browser",
-        description="Runs a gauze scenario in real time: the surgeon's tools follow "
-        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
-        "target; space: pause). What the hands did is kept as recordings, and run "
+        parents=[named, changed, seeded, linked],
+        help="run a scenario in real time and take part in the browser",
+        description="Runs a scenario in real time: what can be guided follows sliders, "
+        "the keyboard (W A S D Q E, arrows and page keys; space: pause) or a gamepad, "
+        "and buttons let things fail. What was done is kept as recordings, and run "
         "again at the end for figures and replay.",
     )
     live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")

@@ -15,8 +15,7 @@ import shutil
 import sys
 from typing import Any
 
-from diagrams.common.cli import extra
-from diagrams.common.scenario import ScenarioError
+from diagrams.common.scenario import ScenarioError, extra
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
