@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from plants.tissue.dicom import is_dicom, read_dicom
 from plants.tissue.image import Image, MaskError
 from plants.tissue.mask_labels import MaskLabels, labels_of
 from plants.tissue.meta_image import read_meta_image
@@ -60,16 +61,21 @@ class Labelled:
 
 
 def read(path: Path, wanted: MaskLabels) -> Labelled:
-    """Reads the file that is named, and no other but a header's data beside it.
+    """Reads the file that is named, and no other but what belongs to it beside it.
+
+    That is a header's data, and the CT of an RTSTRUCT object.
 
     Raises:
         MaskError: If it is damaged, absurdly large, or no label map.
     """
+    if is_dicom(path):
+        image = read_dicom(path, wanted)
+        return cropped(image.values, image)
     ending = [end for end in READERS if path.name.lower().endswith(end)]
     if not ending:
         raise MaskError(
             f"expected a label map whose name ends in {', '.join(READERS)}; export "
-            "other kinds (DICOM-SEG, RTSTRUCT, pictures) as one of these"
+            "other kinds but DICOM (SEG, RTSTRUCT) as one of these"
         )
     reader = READERS[ending[0]]
     if reader is read_nifti:
@@ -78,7 +84,11 @@ def read(path: Path, wanted: MaskLabels) -> Labelled:
         image = reader(path)
     else:
         raise MaskError(f"labels.transform={wanted.transform}: only NIfTI has two")
-    labels = labels_of(image, wanted)
+    return cropped(labels_of(image, wanted), image)
+
+
+def cropped(labels: NDArray[np.uint8], image: Image) -> Labelled:
+    """The part of an image's labels that holds anything."""
     box = []
     for axis in range(3):
         held = np.flatnonzero(labels.any(axis=tuple({0, 1, 2} - {axis})))
