@@ -14,7 +14,8 @@ from typing import IO, Any
 import yaml
 
 from diagrams.common.scenario import ScenarioError, refusals
-from plants.tissue.dicom import files_of, is_dicom
+from plants.tissue.dicom import files_of
+from plants.tissue.segments import is_dicom
 from systems.common.archive import whole
 
 LOCK = ".run"

@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plants.tissue.dicom import is_dicom, read_dicom
+from plants.tissue.dicom import read_dicom
 from plants.tissue.image import Image, MaskError
 from plants.tissue.mask_labels import MaskLabels, labels_of
 from plants.tissue.meta_image import read_meta_image
 from plants.tissue.nifti import AUTO, read_nifti
 from plants.tissue.nrrd import read_nrrd
+from plants.tissue.segments import is_dicom
 
 MOST_MEMORY = 6 * 2**30
 """Of the process, in bytes."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from plants.tissue.dicom import MM, Mask, Segments, header, is_dicom
 from plants.tissue.image import MaskError, check_sizes, damaged, pose
+from plants.tissue.segments import MM, Mask, Segments, header, is_dicom
 
 MOST_FILES = 20_000
 """That are looked at for slices."""
