@@ -24,6 +24,7 @@ examples:
   trocar import FILE --kind jigsaws         another's recording as one of ours
   trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
+  trocar atlas FOLDER                       every mask of a folder planned
 """
 
 RESECT = """\
@@ -183,8 +184,36 @@ def make_parser() -> argparse.ArgumentParser:
         "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
     )
     add_import(commands)
+    spread = argparse.ArgumentParser(add_help=False)
+    spread.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one a core"
+    )
+    spread.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
+    )
+    atlas = commands.add_parser(
+        "atlas",
+        parents=[changed, spread],
+        help="plan every mask of a folder: what is reached, how long, what stays",
+        description="Plans every mask of a folder through one, two and three entries; "
+        "started again with the same DIR it goes on. Writes atlas.html, atlas.csv, "
+        "runs/ (Parquet) and sessions/. Needs the extra `campaigns`.",
+    )
+    atlas.add_argument("folder", metavar="FOLDER", type=Path, help="with masks in it")
+    atlas.add_argument(
+        "--scenario", metavar="NAME", default="resect_mask", help="default: resect_mask"
+    )
+    atlas.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY.SUB=[VALUES]",
+        help="plan with each, e.g. snake.tool_radius=[0.003,0.0035]; repeatable",
+    )
+    atlas.add_argument("--out", metavar="DIR", type=Path, help="default: out/atlas")
     campaign = commands.add_parser(
         "campaign",
+        parents=[spread],
         help="run a scenario many times, varied, and say how sure the answer is",
         description="Runs a campaign; started again with the same DIR it goes on. "
         "Writes runs/ (Parquet), report.html, summary.json and the worst runs as "
@@ -192,12 +221,6 @@ def make_parser() -> argparse.ArgumentParser:
     )
     campaign.add_argument("name", metavar="NAME", help="a campaign's name or its file")
     campaign.add_argument("--runs", type=int, metavar="N", help="of each variant")
-    campaign.add_argument(
-        "--workers", type=int, metavar="N", help="processes; default: one a core"
-    )
-    campaign.add_argument(
-        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
-    )
     campaign.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
     campaign.add_argument("--seed", type=int, metavar="N", help="of the draws")
     campaign.add_argument(

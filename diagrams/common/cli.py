@@ -234,6 +234,13 @@ def campaign_command(arguments: argparse.Namespace) -> int:
     return command.campaign_command(arguments)
 
 
+def atlas_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar atlas`."""
+    with extra("campaigns"):
+        from diagrams.resection import atlas
+    return atlas.atlas_command(arguments)
+
+
 def import_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar import`."""
     from diagrams.common.importing import import_file
@@ -255,6 +262,7 @@ COMMANDS = {
     "resect": resect_command,
     "export": export_command,
     "campaign": campaign_command,
+    "atlas": atlas_command,
     "import": import_command,
 }
 
