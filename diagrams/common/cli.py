@@ -202,7 +202,19 @@ def resect_command(arguments: argparse.Namespace) -> int:
         raise ScenarioError(f"{arguments.name!r} is no resection")
     name = default_name(arguments.name)
     file = arguments.session or Path("out") / f"{name}.session"
-    run_console(scenario, file, sys.stdin, sys.stdin.isatty())
+    if not arguments.browser:
+        run_console(scenario, file, sys.stdin, sys.stdin.isatty())
+        return 0
+    import webbrowser
+
+    from diagrams.resection.browser import run_browser
+
+    def opened(address: str) -> None:
+        print(f"{address}  (Ctrl-C ends it; the session is saved)", flush=True)
+        webbrowser.open(address)
+
+    run_browser(scenario, file, arguments.host, opened)
+    print(f"session {file}; `trocar export {file} --to DIR` is for a viewer")
     return 0
 
 
@@ -220,6 +232,13 @@ def campaign_command(arguments: argparse.Namespace) -> int:
     with extra("campaigns"):
         from diagrams.campaigns import command
     return command.campaign_command(arguments)
+
+
+def atlas_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar atlas`."""
+    with extra("campaigns"):
+        from diagrams.resection import atlas
+    return atlas.atlas_command(arguments)
 
 
 def import_command(arguments: argparse.Namespace) -> int:
@@ -243,6 +262,7 @@ COMMANDS = {
     "resect": resect_command,
     "export": export_command,
     "campaign": campaign_command,
+    "atlas": atlas_command,
     "import": import_command,
 }
 

@@ -78,6 +78,8 @@ def circle_of(
     x, y = place.x + d * cos(bearing), place.y + d * sin(bearing)
     for k in range(first, last + 1):
         r = scan[k % RAYS, 0]
+        if radius > params.largest:
+            break  # it is none that moves, and would only grow
         if r > 0.0:
             a = place.theta + k * STEP
             gap = hypot(place.x + r * cos(a) - x, place.y + r * sin(a) - y)
