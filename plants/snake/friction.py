@@ -18,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from plants.snake.balls import BALLS
+from plants.snake.balls import BALLS, TURNS, times
 from plants.snake.parameters import WIRES
-from plants.snake.statics_kernels import ROPES, Forces, Grip
+from plants.snake.posture import Array
+from plants.snake.statics_kernels import ROPES, Forces, Grip, sine_of
 from systems.common.compiled import compiled
 from systems.common.geometry import norm
 from systems.common.parameter import parameter
@@ -84,7 +85,12 @@ def bound(turns: Any, to: Forces, s: Any, grip: Grip) -> float:
 def remembered(turns: Any, to: Forces, s: Any, grip: Grip) -> float:
     """Takes over where wires and sockets slid to; the work that became heat, in J."""
     heat = 0.0
+    B = np.empty((3, 3))
     for i in range(BALLS):
+        times(grip.turns[i].T, turns[i], B)
+        sine = sine_of(B)
+        for k in range(3):
+            grip.step[3 * i + k] = sine[k] if s.wire + s.socket > 0.0 else 0.0
         for w in range(WIRES * (i // 2), ROPES):
             over = abs(to.slip[i, w]) - s.give
             if over > 0.0:
@@ -100,6 +106,17 @@ def remembered(turns: Any, to: Forces, s: Any, grip: Grip) -> float:
     return heat
 
 
-def copied(grip: Grip) -> Grip:
-    """One that a step may change."""
-    return Grip(*map(np.copy, grip))
+SHAPES = ((BALLS, 3, 3), (BALLS, ROPES), (BALLS, ROPES), (BALLS,), (BALLS, 3), (TURNS,))
+"""Of a `Grip`'s parts."""
+
+
+def flat_grip(grip: Grip) -> Array:
+    """A grip as a block keeps it."""
+    return np.concatenate([np.ravel(part) for part in grip])
+
+
+def grip_of(values: Array) -> Grip:
+    """And back, as arrays of its own: (204,)."""
+    ends = np.cumsum([math.prod(shape) for shape in SHAPES])
+    parts = np.split(np.array(values), ends[:-1])
+    return Grip(*(part.reshape(s) for part, s in zip(parts, SHAPES, strict=True)))

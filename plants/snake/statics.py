@@ -11,7 +11,7 @@ hold as they are, since they depend on the chord p = ||P P'|| across a ball alon
 With R_i exp(delta) and r = R_i^T P, P . R_i c has the gradient c x r and the Hessian
 sym(r c^T) - (r . c) I. The energy of wires, core, weight and tool force is
 
-    E = sum T^2 / 2k  or  sum T L,  T = max(0, pull + k (L - L_d)),  + ...
+    E = sum T^2 / 2k  or  sum T L,  T = max(T_0, pull + k (L - L_d)),  + ...
 
 Where it is least the snake stays; an eigenvalue of its Hessian that is not positive
 says that it does not, though it be in balance.
@@ -26,7 +26,13 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import TURNS, turned_by
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.friction import SnakeFrictionParams, bound, copied, remembered
+from plants.snake.friction import (
+    SnakeFrictionParams,
+    bound,
+    flat_grip,
+    grip_of,
+    remembered,
+)
 from plants.snake.parameters import MODULES, STOP, SnakeParams
 from plants.snake.posture import Array
 from plants.snake.statics_kernels import (
@@ -47,6 +53,8 @@ LONGEST = 0.3
 """Step of a ball in an iteration, in rad."""
 MOST = 60
 """Iterations."""
+AT_ONCE = 2
+"""Iterations in which what friction can hold stays as it is."""
 BOUNDED = 1e-5
 """Change of what friction can hold at which a step is done, in N."""
 RIGID = 1e3
@@ -212,10 +220,10 @@ def slid(
     now, total, lost = start, 0, False
     while True:
         now, to, count, done, left = settled(
-            now, pull, stiffness, wound, load, s, grip, most - total
+            now, pull, stiffness, wound, load, s, grip, min(AT_ONCE, most - total)
         )
         total, lost = total + count, lost or left
-        if bound(now, to, s, grip) < BOUNDED or total >= most:
+        if (bound(now, to, s, grip) < BOUNDED and done) or total >= most:
             break
     heat = remembered(now, to, s, grip)
     n = 3 * MODULES if s.coupled else TURNS
@@ -298,6 +306,7 @@ class Statics:
             ball=v.ball_mass,
             plate=v.plate_mass,
             ring=v.tool_mass,
+            pretension=v.pretension,
             g=np.asarray(gravity, float),
             wire=f.wire,
             socket=f.socket,
@@ -332,6 +341,12 @@ class Statics:
         assembled(turns, *args, self.record[0], grip, to)
         return grip._replace(slip=-to.slip)
 
+    def ahead(self, grip: Grip) -> Array:
+        """Where the balls will be if they turn as in the last step, (6, 3, 3)."""
+        turns = np.empty_like(grip.turns)
+        turned_by(grip.turns, grip.step, turns)
+        return turns
+
     def equilibrium(
         self,
         turns: Array,
@@ -345,9 +360,10 @@ class Statics:
 
         With friction it is the end of a step in which wires and force change steadily,
         from where `grip` holds: that of the last step, or all at rest at `turns`.
+        It is looked for from `turns`, of which `ahead` makes a good guess.
         """
         args = self._arguments(tension, wound, force, moment)
-        grip = copied(grip or self.at_rest(turns))
+        grip = grip_of(flat_grip(grip or self.at_rest(turns)))
         now, to, least, count, done, buckled, heat = slid(
             turns, *args, self.record[0], grip, MOST
         )

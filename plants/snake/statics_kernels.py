@@ -8,7 +8,7 @@ import numpy as np
 from plants.snake.balls import BALLS, TURNS, times
 from plants.snake.parameters import MODULES, WIRES
 from systems.common.compiled import compiled
-from systems.common.geometry import along, norm, over, scaled
+from systems.common.geometry import Vector, along, norm, over, scaled
 
 ROPES = WIRES * MODULES
 
@@ -46,6 +46,8 @@ class Grip(NamedTuple):
         slip: To be added to the path beyond each ball's middle, (6, 9) in m.
         socket: Largest torque of each socket in Nm, (6,).
         strain: By which sockets give way at `turns`, (6, 3) in rad.
+        step: By which the balls turned in the last step, (18,) in rad: the next may be
+            as large, and is looked for from there. Zero without friction.
     """
 
     turns: Any
@@ -53,6 +55,7 @@ class Grip(NamedTuple):
     slip: Any
     socket: Any
     strain: Any
+    step: Any
 
 
 @compiled
@@ -75,7 +78,8 @@ def loose(turns: Any) -> Grip:
     """No friction at all."""
     wires = np.zeros((BALLS, ROPES))
     strain = np.zeros((BALLS, 3))
-    return Grip(turns.copy(), wires, wires.copy(), np.zeros(BALLS), strain)
+    sockets, step = np.zeros(BALLS), np.zeros(TURNS)
+    return Grip(turns.copy(), wires, wires.copy(), sockets, strain, step)
 
 
 @compiled
@@ -180,6 +184,13 @@ def _loads(turns: Any, load: Any, s: Any, g: Any, H: Any) -> float:
 
 
 @compiled
+def sine_of(B: Any) -> Vector:
+    """Axis of a rotation matrix times the sine of its angle."""
+    x, y, z = B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]
+    return 0.5 * x, 0.5 * y, 0.5 * z
+
+
+@compiled
 def _held(w: int, T: float, paths: Any, s: Any, grip: Grip, to: Forces) -> float:
     """Tensions of a wire over its balls, and the energy that its friction stores."""
     count = 2 * (w // WIRES + 1)
@@ -210,9 +221,9 @@ def _socket(i: int, Q: Any, s: Any, grip: Grip, to: Forces, g: Any, H: Any) -> f
     B, G = np.empty((3, 3)), np.empty((3, 3))
     times(grip.turns[i].T, Q, B)
     trace = B[0, 0] + B[1, 1] + B[2, 2]
+    sine = sine_of(B)
     for a in range(3):
-        n, m = (a + 1) % 3, (a + 2) % 3
-        to.strain[i, a] = grip.strain[i, a] + 0.5 * (B[m, n] - B[n, m])
+        to.strain[i, a] = grip.strain[i, a] + sine[a]
         for b in range(3):
             G[a, b] = 0.5 * ((trace if a == b else 0.0) - B[b, a])
     e = (to.strain[i, 0], to.strain[i, 1], to.strain[i, 2])
@@ -287,15 +298,21 @@ def assembled(
     energy = 0.0
     for w in range(ROPES):
         T = pull[w] + stiffness * (to.L[w] - wound[w])
-        if T < 0.0:  # slack; what is no number stays none
-            T = 0.0
+        least = s.pretension if stiffness > 0.0 else 0.0
+        taut = not least > T  # what is no number stays none
+        if stiffness > 0.0 and not taut:
+            energy += least * (T - 0.5 * least) / stiffness
+        T = T if taut else least
         to.T[w] = T
-        energy += T * T / (2 * stiffness) if stiffness > 0.0 else T * to.L[w]
+        if stiffness > 0.0:
+            energy += T * T / (2 * stiffness) if taut else 0.0
+        else:
+            energy += T * to.L[w]
         count = 6 * (w // WIRES + 1)
         energy += _held(w, T, paths, s, grip, to)
         for a in range(count):
             to.g[a] += to.P[a // 3, w] * to.J[w, a]
-        if T > 0.0 and stiffness > 0.0:
+        if taut and T > 0.0 and stiffness > 0.0:
             for a in range(count):
                 ka = stiffness * to.J[w, a]
                 for b in range(count):

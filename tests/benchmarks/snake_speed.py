@@ -129,8 +129,9 @@ def equilibria(friction: SnakeFrictionParams | None = None) -> Callable[[], None
     def sweep() -> None:
         turns, grip = turns_of(x[0]), None
         for lengths in wound:
+            start = turns if grip is None else snake.ahead(grip)
             found = snake.equilibrium(
-                turns, wound=lengths, force=(0.1, 0.0, 0.0), grip=grip
+                start, wound=lengths, force=(0.1, 0.0, 0.0), grip=grip
             )
             assert found.converged
             turns, grip = found.turns, found.grip
