@@ -107,6 +107,7 @@ def page(browser: Any) -> Iterator[Any]:
     """An empty page of 1200 x 800; it must not have failed by itself."""
     failures: list[str] = []
     opened = browser.new_page(viewport={"width": 1200, "height": 800})
+    opened.set_default_timeout(180_000)  # ms, as patient as `screenshot`
     opened.on("pageerror", lambda error: failures.append(str(error)))
     yield opened
     opened.close()

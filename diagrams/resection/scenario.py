@@ -31,7 +31,8 @@ class ResectionScenario(Scenario):
 
     mask: str = parameter(
         "",
-        "a patient's mask (NRRD, NIfTI, MetaImage); the synthetic tumour if empty",
+        "a patient's mask (NRRD, NIfTI, MetaImage, DICOM's SEG or RTSTRUCT); the "
+        "synthetic tumour if empty",
         file=True,
     )
     image: str = parameter(

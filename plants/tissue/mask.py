@@ -33,7 +33,7 @@ SPECK = 0.02
 
 
 def load_mask(path: str | Path, labels: MaskLabels | None = None) -> Tissue:
-    """Reads a label map: NRRD, NIfTI or MetaImage.
+    """Reads a label map: NRRD, NIfTI, MetaImage, DICOM's SEG and RTSTRUCT.
 
     Args:
         path: The file; its own affine is kept. P is LPS, whatever the file's frame.

@@ -20,11 +20,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from plants.tissue.dicom import read_dicom
 from plants.tissue.image import Image, MaskError
 from plants.tissue.mask_labels import MaskLabels, labels_of
 from plants.tissue.meta_image import read_meta_image
 from plants.tissue.nifti import AUTO, read_nifti
 from plants.tissue.nrrd import read_nrrd
+from plants.tissue.segments import is_dicom
 
 MOST_MEMORY = 6 * 2**30
 """Of the process, in bytes."""
@@ -60,13 +62,22 @@ class Labelled:
 
 
 def read(path: Path, wanted: MaskLabels) -> Labelled:
-    """Reads the mask that is named.
+    """Reads the file that is named, and no other but what belongs to it beside it.
+
+    That is a header's data, and the CT of an RTSTRUCT object.
 
     Raises:
         MaskError: If it is damaged, absurdly large, or no label map.
     """
+    if is_dicom(path):
+        image = read_dicom(path, wanted)
+        return cropped(image.values, image)
     image = read_image(path, wanted.transform)
-    labels = labels_of(image, wanted)
+    return cropped(labels_of(image, wanted), image)
+
+
+def cropped(labels: NDArray[np.uint8], image: Image) -> Labelled:
+    """The part of an image's labels that holds anything."""
     box = []
     for axis in range(3):
         held = np.flatnonzero(labels.any(axis=tuple({0, 1, 2} - {axis})))
@@ -85,7 +96,7 @@ def read_image(path: Path, transform: str = AUTO) -> Image:
     if not ending:
         raise MaskError(
             f"expected a label map whose name ends in {', '.join(READERS)}; export "
-            "other kinds (DICOM-SEG, RTSTRUCT, pictures) as one of these"
+            "other kinds but DICOM (SEG, RTSTRUCT) as one of these"
         )
     reader = READERS[ending[0]]
     if reader is read_nifti:

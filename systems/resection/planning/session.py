@@ -11,6 +11,7 @@ from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
+from plants.tissue.labels import TUMOUR
 from plants.tissue.space import Space, roll_back
 from plants.tissue.tissue import Grid, Tissue
 from plants.tissue.volume import Channel, Volume
@@ -121,6 +122,7 @@ class Session:
         steps: What has been committed.
         file: Where every commit is saved; nowhere if None.
         concluded: How a planner went about it that found nothing more to do.
+        reached: Share of the tumour that can be reached, after each entry planned.
     """
 
     volume: Volume
@@ -130,6 +132,7 @@ class Session:
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
     concluded: str = ""
+    reached: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         check(self.params)
@@ -419,6 +422,15 @@ class Session:
         other.stand()
         return other
 
+    def reaches(self, mask: NDArray[np.bool_]) -> float:
+        """Keeps, and returns, the share of the tumour found to be in reach so far."""
+        entry = len(self.volume.more)
+        known = max(self.reached[entry : entry + 1], default=0.0)
+        share = int(mask.sum()) / int((self.volume.labels == TUMOUR).sum())
+        self.reached[entry:] = [max(known, share)]
+        self.save_if_filed()
+        return share
+
     def adopt(self, thought: "Session") -> None:
         """Makes what was done in thought part of the plan, and saves it."""
         self.volume.tau[:] = thought.volume.tau
@@ -484,6 +496,7 @@ class Session:
             "params": asdict(self.params),
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
+            "reached": self.reached,
             "home": home,
             "image": v.image
             and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
@@ -548,6 +561,7 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))
     session.concluded = meta["concluded"]
+    session.reached = list(map(float, meta.get("reached", ())))
     check_removed(session)
     return session
 

@@ -144,7 +144,9 @@ def test_wishes_that_make_no_sense(tmp_path, wanted, message):
 @pytest.mark.parametrize("name", ["p.png", "p.dcm", "p.hdr", "p.tif", "nrrd", "p.vtk"])
 def test_other_kinds_of_files(tmp_path, name):
     (tmp_path / name).write_bytes(b"whatever")
-    with pytest.raises(MaskError, match=r"name ends in \.nrrd.*DICOM-SEG, RTSTRUCT"):
+    with pytest.raises(
+        MaskError, match=r"name ends in \.nrrd.*but DICOM \(SEG, RTSTRUCT"
+    ):
         load_mask(tmp_path / name)
 
 
