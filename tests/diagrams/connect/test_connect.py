@@ -1,10 +1,10 @@
 """OpenIGTLink on loopback, with pyigtl's own server and client on the other side."""
 
-import json
 import math
 import signal
 import socket
 import time
+from types import SimpleNamespace
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -371,16 +371,25 @@ def test_slicer_is_told_what_is_where():
     stream.close()
 
 
-def test_command_line(plus, tmp_path, capsys):
+def test_command_line(plus, tmp_path, capsys, monkeypatch):
+    ran = []
+
+    def run_scenario(scenario, out, *told):
+        ran.append(scenario)
+        return SimpleNamespace(metrics={}, error="")
+
+    monkeypatch.setattr("diagrams.live.command.run_scenario", run_scenario)
     tip = load_scenario("gauze_static").target.points[0]
     where = f"igtl://localhost:{plus.port}?target=Stylus&patience=inf"
     plus.send_message(transform("Stylus", 1e3 * np.array(tip)), wait=False)
     words = ["run", "gauze_static", "--duration", "0.3", "--no-replay"]
     words += ["--out", str(tmp_path), "--tracker", where, "--stream", "igtl://:0"]
     assert main(words) == 0
-    assert json.loads((tmp_path / "metrics.json").read_text())["system"] == "gauze"
     table = np.loadtxt(tmp_path / "target_recording.csv", delimiter=",", skiprows=1)
     assert np.atleast_2d(table)[-1, -1] == 1.0
+    # The tool that the address does not name goes on as it is written.
+    assert ran[0].target.tracked == str(tmp_path / "target_recording.csv")
+    assert ran[0].obstacles[0].tracked is None
     assert main(["run", "nav_one_static", "--tracker", where]) == 2
     assert "expected a gauze delivery" in capsys.readouterr().err
     assert main(["live", "gauze_static", "--tracker", "igtl:/x"]) == 2
