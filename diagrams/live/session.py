@@ -102,11 +102,12 @@ class Session:
         self._guided = [one for one in live.tracked(played) if one.name in seen]
         if self._page:
             self._guided += [o for o in live.guided(played) if o.name not in seen]
-        played = live.held(played, [one.name for one in self._guided])
+        if self._guided:
+            played = live.held(played, [one.name for one in self._guided])
         for one in self._guided:
             setattr(one.owner(played), one.field, "")
         self._first_switch = len(played.faults)
-        self._switches = live.switches(played)
+        self._switches = live.switches(played) if self._page else []
         played.faults = played.faults + [
             Fault(s.kind, NEVER, s.lasting, s.size) for s in self._switches
         ]
@@ -133,7 +134,7 @@ class Session:
         self._simulator.Initialize()
         self.time, self._count, self.speed = 0.0, 0, 0.0
         self._struck: list[list[float]] = [[] for _ in self._switches]
-        self._acts = live.acts(played)
+        self._acts = live.acts(played) if self._page else {}
         self._figures = live.figures(played)
         if live.moving:
             self._figures.append(SPEED)
