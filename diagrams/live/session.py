@@ -36,10 +36,6 @@ USUAL = ("pause", "reset", "another seed", "end and save")
 """Buttons of every session, about those of the system."""
 
 
-SPEED = Figure("speed [mm/s]", lambda session: session.speed, 0.0, 150.0, 1.0)
-"""Of every robot that moves."""
-
-
 def spans(starts: list[float], lasting: float) -> list[tuple[float, float]]:
     """From when to when something is on that lasts so long after each of its starts."""
     found: list[tuple[float, float]] = []
@@ -137,7 +133,10 @@ class Session:
         self._acts = live.acts(played) if self._page else {}
         self._figures = live.figures(played)
         if live.moving:
-            self._figures.append(SPEED)
+            most = 1e3 * live.fastest
+            self._figures.append(
+                Figure("speed [mm/s]", lambda session: session.speed, 0.0, most, 1.0)
+            )
             self._point = np.array(live.moving(self))
         self._said: dict[str, list[tuple[float, np.ndarray]]] = {}
         for one in self._guided:
