@@ -37,9 +37,18 @@ def crossing(job: Job) -> Figures:
     return figures(job["overrides"])
 
 
+def plan(job: Job) -> Figures:
+    """Plans the resection of a mask, which is not carried out."""
+    from diagrams.resection.planned import planned
+    from diagrams.studies import scenario_of
+
+    return planned(scenario_of(copy.deepcopy(job["base"]), job["overrides"]))
+
+
 ACTS: dict[str, Callable[[Job], Figures]] = {
     "scenario": scenario,
     "crossing": crossing,
+    "plan": plan,
 }
 """By the campaign's `act`."""
 

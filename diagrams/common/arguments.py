@@ -19,11 +19,28 @@ examples:
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
-  trocar resect resect_paper                plan a resection by hand
+  trocar resect resect_paper --browser      plan a resection by hand
   trocar export out/resect_paper.session --to viewer   what a viewer can load
   trocar import FILE --kind jigsaws         another's recording as one of ours
   trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
+  trocar atlas FOLDER                       every mask of a folder planned
+"""
+
+RESECT = """\
+Plans a resection by hand: proposes, checks, commits and undoes procedures. The session
+is saved after every commit, and resumed.
+
+  trocar resect resect_paper               line by line; `help` lists the commands
+  trocar resect resect_paper < lines.txt   the same lines again
+  trocar resect resect_paper --browser     by sliders and buttons
+  trocar resect resect_mask --browser --set mask=tumour.nii.gz --set image=t1.nii.gz
+
+In the browser sliders place the procedure, and how it would go is shown at once: what
+it frees in green, or red if it is refused, with the first thing in the way marked in
+pink and named below. A click into a slice moves the procedure there. The buttons are
+the console's commands, and what they did is listed as its lines: planned by clicks or
+by lines, the session is the same. `stop` ends a long `finish`, Ctrl-C or `end` all.
 """
 
 
@@ -47,11 +64,22 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="KEY.SUB=VALUE",
         help="change a value of the scenario, e.g. abdomen.stiffness=800; repeatable",
     )
+    linked = argparse.ArgumentParser(add_help=False)
+    linked.add_argument(
+        "--tracker",
+        metavar="igtl://HOST:PORT",
+        help="tools are where a tracker of PLUS or 3D Slicer sees them; real time",
+    )
+    linked.add_argument(
+        "--stream",
+        metavar="igtl://:PORT",
+        help="tell 3D Slicer and others where everything is; real time",
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("scenarios", help="list the scenarios, one line each")
     run = commands.add_parser(
         "run",
-        parents=[changed, seeded],
+        parents=[changed, seeded, linked],
         help="run a scenario and write figures, plots, log and replay",
         description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
         "PNG, replay.html, report.html and scenario.yaml (exactly what ran) into DIR.",
@@ -82,19 +110,17 @@ def make_parser() -> argparse.ArgumentParser:
     )
     live = commands.add_parser(
         "live",
-        parents=[named, changed, seeded],
-        help="run a gauze scenario in real time and take part in the browser",
-        description="Runs a gauze scenario in real time: the surgeon's tools follow "
-        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
-        "target; space: pause). What the hands did is kept as recordings, and run "
+        parents=[named, changed, seeded, linked],
+        help="run a scenario in real time and take part in the browser",
+        description="Runs a scenario in real time: what can be guided follows sliders, "
+        "the keyboard (W A S D Q E, arrows and page keys; space: pause) or a gamepad, "
+        "and buttons let things fail. What was done is kept as recordings, and run "
         "again at the end for figures and replay.",
     )
     live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")
     live.add_argument("--duration", type=float, metavar="S", help="default: 600 s")
     live.add_argument("--out", metavar="DIR", type=Path, help="default: out/live")
-    live.add_argument(
-        "--host", default="localhost", help="where it listens; '*' for everyone"
-    )
+    listens(live)
     replay = commands.add_parser("replay", help="open a run's replay in the browser")
     replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
     shell = commands.add_parser(
@@ -133,13 +159,17 @@ def make_parser() -> argparse.ArgumentParser:
     resect = commands.add_parser(
         "resect",
         parents=[named, changed],
-        help="plan a resection by hand, line by line",
-        description="Proposes, checks, commits and undoes procedures; `help` lists "
-        "the commands. The session is saved after every commit, and resumed.",
+        help="plan a resection by hand: line by line, or in the browser",
+        description=RESECT,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     resect.add_argument(
         "--session", metavar="FILE", type=Path, help="default: out/NAME.session"
     )
+    resect.add_argument(
+        "--browser", action="store_true", help="sliders, buttons and slices instead"
+    )
+    listens(resect)
     export = commands.add_parser(
         "export",
         help="write a resection's session for a viewer: label maps, path, channels",
@@ -154,8 +184,36 @@ def make_parser() -> argparse.ArgumentParser:
         "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
     )
     add_import(commands)
+    spread = argparse.ArgumentParser(add_help=False)
+    spread.add_argument(
+        "--workers", type=int, metavar="N", help="processes; default: one a core"
+    )
+    spread.add_argument(
+        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
+    )
+    atlas = commands.add_parser(
+        "atlas",
+        parents=[changed, spread],
+        help="plan every mask of a folder: what is reached, how long, what stays",
+        description="Plans every mask of a folder through one, two and three entries; "
+        "started again with the same DIR it goes on. Writes atlas.html, atlas.csv, "
+        "runs/ (Parquet) and sessions/. Needs the extra `campaigns`.",
+    )
+    atlas.add_argument("folder", metavar="FOLDER", type=Path, help="with masks in it")
+    atlas.add_argument(
+        "--scenario", metavar="NAME", default="resect_mask", help="default: resect_mask"
+    )
+    atlas.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY.SUB=[VALUES]",
+        help="plan with each, e.g. snake.tool_radius=[0.003,0.0035]; repeatable",
+    )
+    atlas.add_argument("--out", metavar="DIR", type=Path, help="default: out/atlas")
     campaign = commands.add_parser(
         "campaign",
+        parents=[spread],
         help="run a scenario many times, varied, and say how sure the answer is",
         description="Runs a campaign; started again with the same DIR it goes on. "
         "Writes runs/ (Parquet), report.html, summary.json and the worst runs as "
@@ -163,12 +221,6 @@ def make_parser() -> argparse.ArgumentParser:
     )
     campaign.add_argument("name", metavar="NAME", help="a campaign's name or its file")
     campaign.add_argument("--runs", type=int, metavar="N", help="of each variant")
-    campaign.add_argument(
-        "--workers", type=int, metavar="N", help="processes; default: one a core"
-    )
-    campaign.add_argument(
-        "--scheduler", metavar="ADDRESS", default="", help="of a Dask cluster"
-    )
     campaign.add_argument("--out", metavar="DIR", type=Path, help="default: out/NAME")
     campaign.add_argument("--seed", type=int, metavar="N", help="of the draws")
     campaign.add_argument(
@@ -178,6 +230,13 @@ def make_parser() -> argparse.ArgumentParser:
         help="a planner of one's own as a further variant of `crossing`",
     )
     return parser
+
+
+def listens(parser: argparse.ArgumentParser) -> None:
+    """Adds where a page's server listens to a command's parser."""
+    parser.add_argument(
+        "--host", default="localhost", help="where it listens; '*' for everyone"
+    )
 
 
 def add_import(commands: Any) -> None:

@@ -13,7 +13,9 @@ from typing import IO, Any
 
 import yaml
 
-from diagrams.common.scenario import ScenarioError
+from diagrams.common.scenario import ScenarioError, refusals
+from plants.tissue.dicom import files_of
+from plants.tissue.segments import is_dicom
 from systems.common.archive import whole
 
 LOCK = ".run"
@@ -138,13 +140,17 @@ def save_scenario(scenario: Any, into: Results) -> Path:
     copy = deepcopy(scenario)
     copies: dict[str, Path] = {}
     for owner, name in files(copy):
-        parts = with_data(Path(getattr(owner, name)).absolute())
+        first, *rest = with_data(Path(getattr(owner, name)).absolute())
+        parts = {first.name: first}
+        for p in rest:
+            apart = "" if p.parent == first.parent else f"{p.parent.name}/"
+            parts[f"{apart}{p.name}"] = p
         folder, number = INPUTS, 1
-        while any(copies.get(f"{folder}/{p.name}", p) != p for p in parts):
+        while any(copies.get(f"{folder}/{n}", p) != p for n, p in parts.items()):
             number += 1
             folder = f"{INPUTS}/{number}"
-        copies |= {f"{folder}/{p.name}": p for p in parts}
-        setattr(owner, name, f"{folder}/{parts[0].name}")
+        copies |= {f"{folder}/{n}": p for n, p in parts.items()}
+        setattr(owner, name, f"{folder}/{first.name}")
     into.clear({path.resolve() for path in copies.values()})
     for name, path in copies.items():
         into.copy(path, name)
@@ -165,11 +171,14 @@ def files(params: Any) -> Iterator[tuple[Any, str]]:
 
 
 def with_data(path: Path) -> list[Path]:
-    """A file, and the one beside it that holds the voxels of a MetaImage or NRRD.
+    """A file, and those that belong to it: a MetaImage's voxels, an RTSTRUCT's CT.
 
     Raises:
         ScenarioError: If its header names a file elsewhere, or several.
     """
+    if path.is_file() and is_dicom(path):
+        with refusals():
+            return files_of(path)
     if path.suffix.lower() not in (".mhd", ".nhdr") or not path.is_file():
         return [path]
     with path.open("rb") as stream:

@@ -225,14 +225,14 @@ def place(path: str, index: int, item: Any) -> str:
 
 
 def member(schema: Any, value: Any) -> Any:
-    """The one of several types that a value is of: by its `role`, or the first.
+    """The one of several types that a value is of: by its `role`, or as it is.
 
     Raises:
         ScenarioError: If none has the role.
     """
     members = [m for m in typing.get_args(schema) if m is not type(None)]
     if len(members) == 1 or not isinstance(value, dict):
-        return members[0]
+        return type(value) if type(value) in members else members[0]
     roles = {role: m for m in members for role in _roles(m)}
     role = value.get("role", next(iter(_roles(members[0])), ""))
     if role not in [*roles]:  # a list is no key

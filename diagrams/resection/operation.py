@@ -15,7 +15,6 @@ from diagrams.common.progress import Progress, silent
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.execution import Execution, load_execution
-from plants.tissue.labels import TUMOUR
 from plants.tissue.mask import load_mask
 from plants.tissue.space import NEIGHBOUR
 from plants.tissue.tissue import SyntheticTumour, Tissue, synthetic_tumour
@@ -248,6 +247,7 @@ def finish_plan(
             taken += reach.time
         run_planner(session, reach, scenario, progress)
         mask = mask | reach.mask | session.volume.resected
+        fraction = session.reaches(mask)
         if 1 + len(session.volume.more) >= params.most:
             break
         with progress("a further entry", "of those tried") as show:
@@ -260,7 +260,6 @@ def finish_plan(
             f"trocar: a further entry: {found[0].text(session.volume)}", file=sys.stderr
         )
         session.enter_anew(found[0].X_WE)
-    fraction = int(mask.sum()) / int((session.volume.labels == TUMOUR).sum())
     lumps = [lump for lump in reach.lumps if not _gone(session, lump)]
     return replace(reach, mask=mask, fraction=fraction, time=taken, lumps=lumps)
 

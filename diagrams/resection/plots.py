@@ -87,7 +87,7 @@ def figure8(run: Any) -> Figure:
     return figure
 
 
-def _section(volume: Any, tau: np.ndarray, axis: int) -> np.ndarray:
+def section(volume: Any, tau: np.ndarray, axis: int) -> np.ndarray:
     """Codes of a cut along the channel through its axis, (n, nz)."""
     index = volume.index_of(np.zeros(3))[axis]
     labels = np.take(volume.labels, index, axis=axis)
@@ -121,7 +121,7 @@ def report(run: Any) -> Figure:
             low[2],
         )
         axes.imshow(
-            _section(volume, state, axis).T,
+            section(volume, state, axis).T,
             extent=extent,
             cmap=CUT,
             vmin=-0.5,

@@ -31,7 +31,13 @@ class ResectionScenario(Scenario):
 
     mask: str = parameter(
         "",
-        "a patient's mask (NRRD, NIfTI, MetaImage); the synthetic tumour if empty",
+        "a patient's mask (NRRD, NIfTI, MetaImage, DICOM's SEG or RTSTRUCT); the "
+        "synthetic tumour if empty",
+        file=True,
+    )
+    image: str = parameter(
+        "",
+        "the patient's own image, shown in slices in the browser (formats as a mask)",
         file=True,
     )
     labels: MaskLabels = part(MaskLabels)
@@ -93,7 +99,9 @@ class ResectionScenario(Scenario):
     carver: TissueCarverParams = part(TissueCarverParams)
 
     def rules(self) -> Rules:
-        """Procedures are the robot's, and a mask is there."""
+        """Procedures are the robot's, and files are there."""
         for index, procedure in enumerate(self.procedures):
             check_procedure(procedure, self.snake, f"procedures[{index}]")
-        yield not self.mask or Path(self.mask).is_file(), "mask", "a file that is there"
+        for name in ("mask", "image"):
+            file = getattr(self, name)
+            yield not file or Path(file).is_file(), name, "a file that is there"

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
@@ -16,7 +17,9 @@ from plants.snake.elastic_wires import ElasticWires
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.looks import draw_channel
 from plants.snake.parameters import SnakeParams
+from plants.snake.signals import Drums
 from plants.snake.snake import add_snake, set_default_posture
+from systems.common.outside import Outside
 from systems.common.signal import size
 from systems.resection.wires.ball_location import BallLocation
 from systems.resection.wires.hysteresis_compensation import HysteresisCompensation
@@ -117,6 +120,9 @@ EXPORTS_OF = {
     },
 }
 
+HAND = ("wires_outside.told", "wire_drums.command")
+"""The wire of a hand that winds the drums in the inverse actuation's place."""
+
 CHANNEL_CLEARANCE = 1.0e-3
 """Between the snake's body and the access channel, in m; drawn only."""
 
@@ -125,6 +131,17 @@ def start_posture(scenario: SnakeScenario) -> list[float]:
     """The posture (7) that the tip's reference begins with."""
     target = reference(scenario.tip, 0.0, scenario.snake)
     return tool_postures(*target, scenario.snake).x.tolist()
+
+
+def start_lengths(scenario: SnakeScenario) -> list[float]:
+    """What is wound out at the start: nine wires, and the translation [m] (10)."""
+    s = scenario
+    core = s.core if s.wires == "statics" else PAPERS
+    wound = s.inverse_actuation
+    if s.wires != "drums":
+        wound = replace(wound, stiffness=s.drive.wire_stiffness)
+    lengths = wound_lengths(start_posture(s), wound, s.snake, s.drive, core)
+    return np.ravel(lengths).tolist()
 
 
 def wire_chain(
@@ -249,10 +266,16 @@ def make_snake_diagram(
     draw_channel(plant, plant.world_body(), channel)
     plant.Finalize()
     set_default_posture(plant, snake, start_posture(scenario))
-    blocks = add_blocks(builder, make_blocks(scenario), swaps)
-    systems = blocks | {"plant": plant, "scene_graph": scene_graph}
-    wires = WIRES + WIRES_OF[scenario.wires]
+    made, wires = make_blocks(scenario), WIRES + WIRES_OF[scenario.wires]
     if scenario.compensation == "tracked":
         wires += TRACKER_WIRES
+    if scenario.guided is not None:
+        *lengths, s = start_lengths(scenario)
+        rest = Drums(tuple(lengths), s)
+        tape, period = scenario.guided, scenario.period
+        made["wires_outside"] = Outside(Drums, rest, tape, period)
+        wires = (*(wire for wire in wires if wire[1] != HAND[1]), HAND)
+    blocks = add_blocks(builder, made, swaps)
+    systems = blocks | {"plant": plant, "scene_graph": scene_graph}
     exports = EXPORTS | EXPORTS_OF[scenario.wires]
     return finish(builder, "snake", systems, wires, exports, scenario.faults)

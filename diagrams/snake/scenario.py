@@ -50,6 +50,9 @@ class SnakeScenario(Scenario):
         "in which each ball turns as wires, core and load have it",
         choices=WIRE_MODELS,
     )
+    guided: str | None = parameter(
+        None, "tape of the drums' commands, wound by hand; '': live", file=True
+    )
     snake: SnakeParams = part(SnakeParams)
     drive: SnakeDriveParams = part(SnakeDriveParams)
     tip: TipReferenceParams = part(TipReferenceParams)

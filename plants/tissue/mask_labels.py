@@ -1,6 +1,6 @@
 """What a mask's numbers mean: which voxels are tumour, and which are critical."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 import math
 
@@ -24,14 +24,15 @@ MOST_UNNAMED = 16
 class MaskLabels:
     """Which labels of a mask mean what."""
 
-    tumour: list[int] = parameter(
+    tumour: list[int | str] = parameter(
         [],
-        "labels that are tumour; all but 0 and the critical ones if empty",
+        "labels that are tumour, of DICOM's segments numbers or names; all but 0 and "
+        "the critical ones if empty",
         least=0,
         most=HIGHEST,
         shape=(-1,),
     )
-    critical: list[int] = parameter(
+    critical: list[int | str] = parameter(
         [], "labels that must not be touched", least=0, most=HIGHEST, shape=(-1,)
     )
     component: int = parameter(
@@ -94,8 +95,8 @@ def labels_of(image: Image, wanted: MaskLabels) -> NDArray[np.uint8]:
     if len(there) > MOST_LABELS:
         raise _no_label_map(values, f"{len(there)} values from {low:g} to {high:g}")
     meaning = np.zeros(HIGHEST + 1, np.uint8)
-    meaning[_tumour_of(there, wanted, image.notes)] = TUMOUR
-    meaning[wanted.critical] = CRITICAL
+    meaning[np.array(_tumour_of(there, wanted, image.notes))] = TUMOUR
+    meaning[np.array(wanted.critical, int)] = CRITICAL
     labels = np.empty(values.shape, np.uint8, order="F")
     for k, whole in enumerate(_slices(values)):
         labels[..., k] = meaning[whole]
@@ -122,11 +123,18 @@ def _no_label_map(values: NDArray, why: str) -> MaskError:
     )
 
 
-def _tumour_of(there: list[int], wanted: MaskLabels, notes: list[str]) -> list[int]:
+def _tumour_of(
+    there: list[int], wanted: MaskLabels, notes: list[str]
+) -> list[int | str]:
     """Which labels of those there are tumour."""
     found = [label for label in there if label != 0]
     for key, labels in (("tumour", wanted.tumour), ("critical", wanted.critical)):
         for label in labels:
+            if isinstance(label, str):
+                raise MaskError(
+                    f"labels.{key}={labels}: expected numbers, only DICOM's segments "
+                    f"have names; it has {_some(found)}"
+                )
             if label == 0:
                 raise MaskError(
                     f"labels.{key}={labels}: 0 is the background; it has {_some(found)}"
@@ -139,7 +147,7 @@ def _tumour_of(there: list[int], wanted: MaskLabels, notes: list[str]) -> list[i
                 )
     if wanted.tumour:
         return wanted.tumour
-    rest = [label for label in found if label not in wanted.critical]
+    rest: list[int | str] = [label for label in found if label not in wanted.critical]
     if not rest:
         raise MaskError(f"the mask is empty, no voxel is tumour: it has {_some(there)}")
     if 0 not in there:
@@ -157,7 +165,7 @@ def _tumour_of(there: list[int], wanted: MaskLabels, notes: list[str]) -> list[i
     return rest
 
 
-def _some(labels: list[int]) -> str:
+def _some(labels: Sequence[int | str]) -> str:
     if len(labels) <= 12:
-        return str(labels)
+        return str(list(labels))
     return f"[{', '.join(map(str, labels[:10]))}, ..., {labels[-1]}]"

@@ -11,6 +11,7 @@ from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
 from plants.tissue.critical import Boxes
+from plants.tissue.labels import TUMOUR
 from plants.tissue.space import Space, roll_back
 from plants.tissue.tissue import Grid, Tissue
 from plants.tissue.volume import Channel, Volume
@@ -91,6 +92,24 @@ class Step:
 
 
 @dataclass
+class Preview:
+    """A procedure as it would go.
+
+    Attributes:
+        answer: Whether it is feasible now.
+        tips: Where its tool goes if nothing is in the way, in W in m, (n, 3).
+        freed: Flat indices of the tumour's voxels that it frees; if it is refused,
+            before that.
+        posture: The robot where it ends, or comes to a stand, (7,).
+    """
+
+    answer: Answer
+    tips: NDArray[np.float64]
+    freed: NDArray[np.int32]
+    posture: NDArray[np.float64]
+
+
+@dataclass
 class Session:
     """A resection under way.
 
@@ -103,6 +122,7 @@ class Session:
         steps: What has been committed.
         file: Where every commit is saved; nowhere if None.
         concluded: How a planner went about it that found nothing more to do.
+        reached: Share of the tumour that can be reached, after each entry planned.
     """
 
     volume: Volume
@@ -112,6 +132,7 @@ class Session:
     steps: list[Step] = field(default_factory=list)
     file: Path | None = None
     concluded: str = ""
+    reached: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         check(self.params)
@@ -144,11 +165,15 @@ class Session:
 
     def check(self, procedure: Procedure) -> Answer:
         """Whether a procedure is feasible now; nothing changes."""
-        answer = self._do(procedure)
-        self._take_back(self._mark)
-        return answer
+        return self.preview(procedure).answer
 
-    preview = check
+    def preview(self, procedure: Procedure) -> Preview:
+        """How a procedure would go now, to be drawn; nothing changes."""
+        answer, s = self._do(procedure), self.volume.space()
+        tree, freed = self.tree, s.freed[: s.used[0]].copy()
+        posture = tree.x[tree.route[tree.size[1] - 1]].copy()
+        self._take_back(self._mark)
+        return Preview(answer, self._tips, freed, posture)
 
     def commit(self, procedure: Procedure) -> Answer:
         """Makes a procedure part of the plan if it is feasible."""
@@ -212,10 +237,14 @@ class Session:
         )
 
     def _do(self, procedure: Procedure) -> Answer:
-        """Carries a procedure out in thought; `_mark` is how it was before."""
+        """Carries a procedure out in thought.
+
+        `_mark` is how it was before, `_tips` where its tool goes.
+        """
         self.volume.forget_journals()
         self.make_room()
         self._mark = (0, 0, int(self.tree.size[0]), int(self.tree.size[1]))
+        self._tips = np.empty((0, 3))
         check_procedure(procedure, self.params)
         params = with_tool(self.params, procedure.tool)
         body = self.body
@@ -234,7 +263,7 @@ class Session:
         n, s = R_WE @ own.axis(), self.volume.space()
         x = np.empty(7)
         O2 = R_WE @ start + o - (params.straight_module + params.tool_offset) * n
-        tips = tips_of(own, start, params) @ R_WE.T + o
+        tips = self._tips = tips_of(own, start, params) @ R_WE.T + o
         start = R_WE @ start + o
         status = posture_at(body, O2, n, x)
         if status == OK:
@@ -393,6 +422,15 @@ class Session:
         other.stand()
         return other
 
+    def reaches(self, mask: NDArray[np.bool_]) -> float:
+        """Keeps, and returns, the share of the tumour found to be in reach so far."""
+        entry = len(self.volume.more)
+        known = max(self.reached[entry : entry + 1], default=0.0)
+        share = int(mask.sum()) / int((self.volume.labels == TUMOUR).sum())
+        self.reached[entry:] = [max(known, share)]
+        self.save_if_filed()
+        return share
+
     def adopt(self, thought: "Session") -> None:
         """Makes what was done in thought part of the plan, and saves it."""
         self.volume.tau[:] = thought.volume.tau
@@ -458,6 +496,7 @@ class Session:
             "params": asdict(self.params),
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
+            "reached": self.reached,
             "home": home,
             "image": v.image
             and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
@@ -522,6 +561,7 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))
     session.concluded = meta["concluded"]
+    session.reached = list(map(float, meta.get("reached", ())))
     check_removed(session)
     return session
 
