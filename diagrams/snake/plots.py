@@ -173,6 +173,7 @@ def statics(run: Any) -> Figure:
     bottom.plot(time, 1e3 * least, color=COLORS["robot"])
     bottom.axhline(0.0, color="k", lw=0.8)
     bottom.set(ylabel="least eigenvalue\n[mN m/rad]", xlabel="time [s]")
+    bottom.set_yscale("symlog", linthresh=10.0)  # what friction holds is stiff
     _events(run, top, middle, bottom)
     if run.watch.alarm.time[-1] >= 0.0:
         bottom.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
