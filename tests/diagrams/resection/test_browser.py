@@ -117,6 +117,7 @@ def test_by_clicks_as_by_lines(page, tmp_path):
         assert page.get_attribute("#words", "class") == "bad"
         assert "meets the wall of the channel" in page.inner_text("#answer")
         bad = clicks.scene()
+        page.evaluate("document.getElementById('scene').remove()")  # it is seen enough
         clicks.press("suggest")
         clicks.press("commit")
         clicks.press("undo")
