@@ -218,7 +218,7 @@ def slid(
         and the heat in J.
     """
     now, total, lost = start, 0, False
-    while True:
+    for _ in range(most + 1):
         now, to, count, done, left = settled(
             now, pull, stiffness, wound, load, s, grip, min(AT_ONCE, most - total)
         )

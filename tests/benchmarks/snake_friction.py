@@ -22,7 +22,7 @@ ROWS = {
 }
 WAYS: dict[str, tuple[list[str], float]] = {
     "circle": ([], 5.0),
-    "scan": (["tip.way=scan", "tip.scan.rings=3", "tip.circle.period=3.0"], 7.5),
+    "scan": (["tip.way=scan", "tip.scan.rings=3"], 10.5),
 }
 FREE = ["load.cutting=0", "hysteresis.cutting=0"]
 
