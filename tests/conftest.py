@@ -1,5 +1,6 @@
 """Fixtures that all tests share, and their order."""
 
+from collections.abc import Iterator
 from functools import cache
 import json
 import os
@@ -72,21 +73,57 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.fixture(scope="session")
-def screenshot(tmp_path_factory: pytest.TempPathFactory):
-    """A function that opens an HTML file in headless Chromium and returns a PNG."""
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        reason = "no Chromium on this machine: the replay cannot be opened"
+def chromium() -> str:
+    """Where Chromium is."""
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    if found is None:
+        reason = "no Chromium on this machine: no page can be opened"
         if os.environ.get("TROCAR_REQUIRE_BROWSER"):
             pytest.fail(reason)
         pytest.skip(reason)
+    return found
+
+
+@pytest.fixture(scope="module")
+def browser(chromium: str) -> Iterator[Any]:
+    """Headless Chromium, driven by Playwright: `browser.new_page()`.
+
+    Not for the session: while Playwright runs, its event loop counts as this thread's,
+    and what calls `asyncio.run` in another module would be refused.
+    """
+    from playwright.sync_api import sync_playwright
+
+    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with sync_playwright() as playwright:
+        found = playwright.chromium.launch(
+            executable_path=chromium, args=[*flags, "--use-gl=angle"]
+        )
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def page(browser: Any) -> Iterator[Any]:
+    """An empty page of 1200 x 800; it must not have failed by itself."""
+    failures: list[str] = []
+    opened = browser.new_page(viewport={"width": 1200, "height": 800})
+    opened.set_default_timeout(180_000)  # ms, as patient as `screenshot`
+    opened.on("pageerror", lambda error: failures.append(str(error)))
+    yield opened
+    opened.close()
+    assert not failures
+
+
+@pytest.fixture(scope="session")
+def screenshot(chromium: str, tmp_path_factory: pytest.TempPathFactory):
+    """A function that opens an HTML file in headless Chromium and returns a PNG."""
 
     def take(page: Path) -> Path:
         picture = tmp_path_factory.mktemp("screenshot") / f"{page.stem}.png"
         profile = tmp_path_factory.mktemp("profile")
         subprocess.run(
             [
-                browser,
+                chromium,
                 *CHROMIUM_FLAGS,
                 f"--user-data-dir={profile}",
                 f"--screenshot={picture}",

@@ -105,6 +105,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.common.cli",
         "diagrams.learning.baselines",
         "diagrams.learning.environments",
+        "diagrams.live.command",
         "diagrams.live.session",
     }
     assert importers(arrows, "diagrams.studies") == {
@@ -114,6 +115,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.common.cli",
         "diagrams.common.run",
         "diagrams.learning.environments",
+        "diagrams.live.command",
         "diagrams.live.session",
         "diagrams.resection.atlas",
         "diagrams.resection.export",

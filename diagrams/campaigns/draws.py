@@ -18,6 +18,7 @@ from systems.common.geometry import (
 )
 from systems.common.signal import Vector, vector
 
+_PEOPLE = (5, 10, 15, 20, 30, 40)
 _TRIES = 400
 _LEAST_WAY = 0.03
 """Of the robot's tip [m]."""
@@ -172,6 +173,24 @@ def operation(tape: Tape) -> dict[str, Any]:
     }
 
 
+def crowd(tape: Tape) -> dict[str, Any]:
+    """A crowd of 5 to 40 people that crosses a circle, a world of its own.
+
+    Twenty just find room on CrowdNav's circle of 4 m; more have a wider one, with as
+    much of it for each, and the robot a longer way and time.
+    """
+    people = _PEOPLE[tape.whole("people", len(_PEOPLE))]
+    circle = max(4.0, people / 5)
+    return {
+        "crowd.people": people,
+        "crowd.seed": tape.whole("seed", 1_000_000),
+        "crowd.circle": circle,
+        "start": [0.0, -circle],
+        "goal": [0.0, circle],
+        "duration": 10.0 * circle,
+    }
+
+
 def _eye(g_o: Vector, g_s: Vector) -> list[float]:
     """A trocar of the endoscope away from the others, of eight in a ring."""
     ring: list[Vector] = [
@@ -216,4 +235,5 @@ def _patient(tape: Tape) -> dict[str, Any]:
 DRAWS: dict[str, Callable[[Tape], dict[str, Any]]] = {
     "": lambda tape: {},
     "operation": operation,
+    "crowd": crowd,
 }

@@ -26,7 +26,7 @@ from diagrams.campaigns.acts import Job
 from diagrams.campaigns.supervisor import ROOT, Child, Limits
 from diagrams.common.scenario import ScenarioError
 
-_BATCH_TIME = 5.0
+_BATCH_TIME = 10.0
 """Of a batch [s], once it is known how long a run takes."""
 _LONGEST_BATCH = 200
 _AHEAD = 2

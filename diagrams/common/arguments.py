@@ -13,18 +13,35 @@ examples:
   trocar run gauze_dynamic                  results in out/gauze_dynamic
   trocar run 'pwe_*' nav_crowd              several, one after the other
   trocar live gauze_dynamic                 take part, in the browser
+  trocar live gauze_static --tracker igtl://localhost:18944   tools by PLUS or Slicer
   trocar replay out/gauze_dynamic           opens the replay in the browser
   trocar compare out/gauze_static out/printed
   trocar run gauze_static --set go_to_target.form=printed --out out/printed
   trocar run out/gauze_dynamic/scenario.yaml --seed 7
   trocar diagram gauze_static               the block diagram as a picture
   trocar keys gauze_static fuzzy            what can be set, with bounds and meaning
-  trocar resect resect_paper                plan a resection by hand
+  trocar resect resect_paper --browser      plan a resection by hand
   trocar export out/resect_paper.session --to viewer   what a viewer can load
   trocar import FILE --kind jigsaws         another's recording as one of ours
   trocar access keyhole_resect              entries and trocars, ranked by reach
   trocar campaign operations --runs 200     many runs, and how sure that is
   trocar atlas FOLDER                       every mask of a folder planned
+"""
+
+RESECT = """\
+Plans a resection by hand: proposes, checks, commits and undoes procedures. The session
+is saved after every commit, and resumed.
+
+  trocar resect resect_paper               line by line; `help` lists the commands
+  trocar resect resect_paper < lines.txt   the same lines again
+  trocar resect resect_paper --browser     by sliders and buttons
+  trocar resect resect_mask --browser --set mask=tumour.nii.gz --set image=t1.nii.gz
+
+In the browser sliders place the procedure, and how it would go is shown at once: what
+it frees in green, or red if it is refused, with the first thing in the way marked in
+pink and named below. A click into a slice moves the procedure there. The buttons are
+the console's commands, and what they did is listed as its lines: planned by clicks or
+by lines, the session is the same. `stop` ends a long `finish`, Ctrl-C or `end` all.
 """
 
 
@@ -48,11 +65,22 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="KEY.SUB=VALUE",
         help="change a value of the scenario, e.g. abdomen.stiffness=800; repeatable",
     )
+    linked = argparse.ArgumentParser(add_help=False)
+    linked.add_argument(
+        "--tracker",
+        metavar="igtl://HOST:PORT",
+        help="tools are where a tracker of PLUS or 3D Slicer sees them; real time",
+    )
+    linked.add_argument(
+        "--stream",
+        metavar="igtl://:PORT",
+        help="tell 3D Slicer and others where everything is; real time",
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     commands.add_parser("scenarios", help="list the scenarios, one line each")
     run = commands.add_parser(
         "run",
-        parents=[changed, seeded],
+        parents=[changed, seeded, linked],
         help="run a scenario and write figures, plots, log and replay",
         description="Runs a scenario. Writes metrics.json, signals.csv, plots as "
         "PNG, replay.html, report.html and scenario.yaml (exactly what ran) into DIR.",
@@ -83,19 +111,17 @@ def make_parser() -> argparse.ArgumentParser:
     )
     live = commands.add_parser(
         "live",
-        parents=[named, changed, seeded],
-        help="run a gauze scenario in real time and take part in the browser",
-        description="Runs a gauze scenario in real time: the surgeon's tools follow "
-        "sliders or the keyboard (W A S D Q E: the obstacle; arrows and page keys: the "
-        "target; space: pause). What the hands did is kept as recordings, and run "
+        parents=[named, changed, seeded, linked],
+        help="run a scenario in real time and take part in the browser",
+        description="Runs a scenario in real time: what can be guided follows sliders, "
+        "the keyboard (W A S D Q E, arrows and page keys; space: pause) or a gamepad, "
+        "and buttons let things fail. What was done is kept as recordings, and run "
         "again at the end for figures and replay.",
     )
     live.add_argument("--speed", type=float, default=1.0, help="of time; default: 1")
     live.add_argument("--duration", type=float, metavar="S", help="default: 600 s")
     live.add_argument("--out", metavar="DIR", type=Path, help="default: out/live")
-    live.add_argument(
-        "--host", default="localhost", help="where it listens; '*' for everyone"
-    )
+    listens(live)
     replay = commands.add_parser("replay", help="open a run's replay in the browser")
     replay.add_argument("folder", metavar="DIR", type=Path, help="results of a run")
     shell = commands.add_parser(
@@ -134,13 +160,17 @@ def make_parser() -> argparse.ArgumentParser:
     resect = commands.add_parser(
         "resect",
         parents=[named, changed],
-        help="plan a resection by hand, line by line",
-        description="Proposes, checks, commits and undoes procedures; `help` lists "
-        "the commands. The session is saved after every commit, and resumed.",
+        help="plan a resection by hand: line by line, or in the browser",
+        description=RESECT,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     resect.add_argument(
         "--session", metavar="FILE", type=Path, help="default: out/NAME.session"
     )
+    resect.add_argument(
+        "--browser", action="store_true", help="sliders, buttons and slices instead"
+    )
+    listens(resect)
     export = commands.add_parser(
         "export",
         help="write a resection's session for a viewer: label maps, path, channels",
@@ -212,6 +242,13 @@ def make_parser() -> argparse.ArgumentParser:
         help="a planner of one's own as a further variant of `crossing`",
     )
     return parser
+
+
+def listens(parser: argparse.ArgumentParser) -> None:
+    """Adds where a page's server listens to a command's parser."""
+    parser.add_argument(
+        "--host", default="localhost", help="where it listens; '*' for everyone"
+    )
 
 
 def add_import(commands: Any) -> None:

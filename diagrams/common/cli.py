@@ -1,8 +1,7 @@
 """The command line: `trocar`, or `python -m diagrams`."""
 
 import argparse
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 import fnmatch
 import json
 import logging
@@ -12,7 +11,7 @@ import sys
 
 from diagrams.common.arguments import make_parser
 from diagrams.common.progress import progress_bar
-from diagrams.common.scenario import ScenarioError, nearest, scenario_files
+from diagrams.common.scenario import ScenarioError, extra, nearest, scenario_files
 from diagrams.common.tree import read_tree
 
 
@@ -51,18 +50,6 @@ def find_names(patterns: Sequence[str]) -> list[str]:
     return names
 
 
-@contextmanager
-def extra(name: str) -> Iterator[None]:
-    """What is imported in this context may need an extra that is not installed."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        raise ScenarioError(
-            f"no module {error.name!r}: this needs the extra {name}, "
-            f"pip install 'trocar[{name}]'"
-        ) from error
-
-
 def run_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar run`."""
     names = find_names(arguments.names)
@@ -86,8 +73,13 @@ def run_one(arguments: argparse.Namespace, name: str, out: Path) -> int:
     scenario = load_scenario(
         name, arguments.overrides, arguments.seed, arguments.duration
     )
-    told = (not arguments.no_replay, progress_bar, arguments.endoscope)
-    run = run_scenario(scenario, out, *told)
+    if arguments.tracker or arguments.stream:
+        from diagrams.live.command import beside
+
+        run = beside(arguments, scenario, out)
+    else:
+        told = (not arguments.no_replay, progress_bar, arguments.endoscope)
+        run = run_scenario(scenario, out, *told)
     if arguments.json:
         print(json.dumps(run.metrics, indent=2))
     else:
@@ -126,25 +118,11 @@ def compare_command(arguments: argparse.Namespace) -> int:
 
 def live_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar live`."""
-    import webbrowser
-
     from diagrams.common.figures import table
-    from diagrams.common.replay import start_meshcat
-    from diagrams.common.run import run_scenario
-    from diagrams.live.session import Session
-    from diagrams.studies import load_scenario
+    from diagrams.live.command import live_command
 
-    if not 0.0 < arguments.speed <= 20.0:
-        raise ScenarioError(f"--speed {arguments.speed}: expected > 0 and <= 20")
-    scenario = load_scenario(arguments.name, arguments.overrides, arguments.seed)
+    run = live_command(arguments)
     out = arguments.out or Path("out") / "live"
-    meshcat = start_meshcat(arguments.host)
-    session = Session(scenario, meshcat)
-    print(f"{meshcat.web_url()}  (Ctrl-C ends it and keeps what was done)")
-    webbrowser.open(meshcat.web_url())
-    with suppress(KeyboardInterrupt):
-        session.play(arguments.duration or 600.0, arguments.speed)
-    run = run_scenario(session.save(out), out, progress=progress_bar)
     print(table(run.metrics))
     print(f"\n{out}/: trocar replay {out}, trocar run {out / 'scenario.yaml'}")
     return 1 if run.error else 0
@@ -224,7 +202,19 @@ def resect_command(arguments: argparse.Namespace) -> int:
         raise ScenarioError(f"{arguments.name!r} is no resection")
     name = default_name(arguments.name)
     file = arguments.session or Path("out") / f"{name}.session"
-    run_console(scenario, file, sys.stdin, sys.stdin.isatty())
+    if not arguments.browser:
+        run_console(scenario, file, sys.stdin, sys.stdin.isatty())
+        return 0
+    import webbrowser
+
+    from diagrams.resection.browser import run_browser
+
+    def opened(address: str) -> None:
+        print(f"{address}  (Ctrl-C ends it; the session is saved)", flush=True)
+        webbrowser.open(address)
+
+    run_browser(scenario, file, arguments.host, opened)
+    print(f"session {file}; `trocar export {file} --to DIR` is for a viewer")
     return 0
 
 

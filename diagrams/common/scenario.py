@@ -28,6 +28,18 @@ def refusals() -> Iterator[None]:
         raise ScenarioError(str(error)) from error
 
 
+@contextmanager
+def extra(name: str) -> Iterator[None]:
+    """What is imported in this context may need an extra that is not installed."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise ScenarioError(
+            f"no module {error.name!r}: this needs the extra {name}, "
+            f"pip install 'trocar[{name}]'"
+        ) from error
+
+
 @dataclass
 class Scenario:
     """What every scenario has. A study's own dataclass adds its fields.

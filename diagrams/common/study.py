@@ -8,6 +8,7 @@ from typing import Any
 from pydrake.systems.analysis import SimulatorConfig
 
 from diagrams.common.case import Case
+from diagrams.common.live import Live
 from diagrams.common.progress import Progress
 from diagrams.common.scenario import Scenario
 
@@ -71,6 +72,7 @@ class Study:
         companions: Scenarios to run beside one, by name; those have none.
         can_film: Raises ScenarioError where `film` cannot work; None without a camera.
         film: Writes the film of a run into its results.
+        live: How it is run live; None if it is not.
     """
 
     name: str
@@ -100,3 +102,4 @@ class Study:
     companions: Callable[[Any], dict[str, Any]] = lambda scenario: {}
     can_film: Callable[[], None] | None = None
     film: Callable[[Any, Any], None] = lambda run, into: None
+    live: Live | None = None

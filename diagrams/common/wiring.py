@@ -10,7 +10,7 @@ from plants.faults.faulty_wire import FaultyWire
 
 PLACES = {
     "force": "tool_wrench.wrench",
-    "frame": "optical_tracker.*_measured",
+    "frame": "*_tracker.*_measured",
     "estimate": "*_estimator.estimate",
     "tension": "*.tension",
     "arm": "joint_commands.set_point",

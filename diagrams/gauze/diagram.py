@@ -19,16 +19,19 @@ from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from diagrams.gauze.tools import OBSTACLE, HandTool, hands
 from plants.organs.organs import OrganSet
+from plants.surgeon.guided_tool import GuidedTool
 from plants.surgeon.hunting_tool import HuntingTool
 from plants.surgeon.surgeon_tool import Patient, SurgeonTool
+from plants.surgeon.tracked_tool import Sighting, TrackedTool, unsighted
 from systems.auto_guidance.backward_movement import BackwardMovement
 from systems.auto_guidance.fuzzy_arbiter import FuzzyArbiter
 from systems.auto_guidance.go_to_target import GoToTarget
 from systems.auto_guidance.velocity_corrections import VelocityCorrections
 from systems.bypass.clearance_constraint import ClearanceConstraint
 from systems.bypass.tool_bypass import ToolBypass
-from systems.common.signal import size
-from systems.common.signals import Estimate
+from systems.common.outside import Outside
+from systems.common.signal import size, vector
+from systems.common.signals import Estimate, Point
 from systems.motion.camera_planner import CameraPlanner
 from systems.motion.endoscope import Endoscope
 from systems.motion.joint_commands import JointCommands
@@ -96,14 +99,19 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
         ("endoscope.shaft", f"clearance.{scenario.camera.name}"),
     ]
     for name, tool in hands(scenario.tools, scenario.seed).items():
+        shown = "shaft" if tool.tracked is None else "shown"
         wires += [
-            (f"{name}_tool.shaft", f"optical_tracker.{name}"),
+            (f"{name}_tool.{shown}", f"optical_tracker.{name}"),
             *seen(name, scenario.registration.active),
             (f"{name}_tool.shaft", f"posed_tools.{name}"),
             (f"{name}_tool.shaft", f"clearance.{name}"),
         ]
         if tool.hunt.speed:
             wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))
+        if tool.tracked is not None:
+            wires.append((f"{name}_outside.told", f"{name}_tool.sighting"))
+        elif tool.guided is not None:
+            wires.append((f"{name}_outside.told", f"{name}_tool.wanted"))
     if len(scenario.obstacles) > 1:
         wires += [
             (f"{tool.name}_estimator.estimate", f"obstacle_estimates.u{index}")
@@ -202,10 +210,23 @@ EXTRA_EXPORTS = {"planner.way": "go_to_target.way"}
 
 def make_tool(tool: HandTool, scenario: GauzeScenario) -> Any:
     """The block of a tool in the surgeon's hand."""
+    if tool.tracked is not None:
+        return TrackedTool()
+    if tool.guided is not None:
+        return GuidedTool(tool)
     if tool.hunt.speed:
         return HuntingTool(tool, tool.hunt)
     patient = Patient(scenario.wall_motion.excursion, scenario.duration)
     return SurgeonTool(tool, patient)
+
+
+def make_outside(tool: HandTool) -> Any:
+    """What tells a tool where it is, or is wanted, from outside; None if nothing."""
+    if tool.tracked is not None:
+        return Outside(Sighting, unsighted(tool), tool.tracked)
+    if tool.guided is not None:
+        return Outside(Point, Point(vector(tool.points[0])), tool.guided)
+    return None
 
 
 def aliases(scenario: GauzeScenario) -> dict[str, str]:
@@ -261,6 +282,8 @@ def make_blocks(
     }
     for name, tool in tools.items():
         blocks[f"{name}_tool"] = make_tool(tool, s)
+        if outside := make_outside(tool):
+            blocks[f"{name}_outside"] = outside
         blocks[f"{name}_estimator"] = TrajectoryEstimator(
             replace(
                 s.estimator,

@@ -22,6 +22,7 @@ def last_event(scenario: GauzeScenario) -> float:
     held = [scenario.target, *scenario.obstacles]
     wall = scenario.wall_motion
     goes_on = any(t.recording or t.hunt.speed or t.hand.seed or t.pushes for t in held)
+    goes_on |= any(t.guided is not None or t.tracked is not None for t in held)
     if goes_on or any(wall.rise) or wall.irregular.coughs or scenario.faults:
         return math.inf
     steps = [wall.step_time + wall.step_duration] if any(wall.step) else []

@@ -181,6 +181,8 @@ def withdrawn(tool: HandTool) -> HandTool:
         times=[0.0],
         points=inside,
         recording=None,
+        guided=None,
+        tracked=None,
         pushes=[],
         hunt=Hunt(),
         hand=SyntheticHand(),

@@ -12,6 +12,7 @@ from diagrams.common.study import Study, View
 from diagrams.gauze import film
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.ending import ending
+from diagrams.gauze.live import LIVE
 from diagrams.gauze.metrics import measure
 from diagrams.gauze.organs import organ_signals
 from diagrams.gauze.plots import plots
@@ -123,6 +124,7 @@ STUDY = Study(
     companions=companions,
     can_film=film.refuse_without_egl,
     film=film.save_film,
+    live=LIVE,
     required=(
         "system",
         "duration",

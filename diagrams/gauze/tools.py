@@ -29,6 +29,12 @@ class HandTool(SurgeonToolParams):
     name: str = parameter("", "by which keys, log and figures go")
     role: str = parameter(OBSTACLE, "what it is to the robot", choices=ROLES[:2])
     hunt: Hunt = part(Hunt)
+    guided: str | None = parameter(
+        None, "tape `t,x,y,z` of where somebody wanted its tip; '': live", file=True
+    )
+    tracked: str | None = parameter(
+        None, "tape of what another program's tracker saw of it; '': live", file=True
+    )
 
     def rules(self) -> Rules:
         """What hunts does nothing else."""
@@ -36,6 +42,13 @@ class HandTool(SurgeonToolParams):
         alone = not (self.recording or self.breathes or self.hand.seed)
         told = "0 together with a recording, breathing or a synthetic hand"
         yield alone or not self.hunt.speed, "hunt.speed", told
+        alone = not (self.recording or self.hunt.speed or self.hand.seed)
+        for name in ("guided", "tracked"):
+            led = getattr(self, name) is not None
+            told = "None together with a recording, a hunt or a synthetic hand"
+            yield not led or alone, name, told
+        both = self.guided is not None and self.tracked is not None
+        yield not both, "tracked", "None where it is guided"
 
 
 @dataclass

@@ -9,6 +9,7 @@ from diagrams.bedside.wrist import WRIST_SIGNALS
 from diagrams.common.study import Study, View, cenic
 from diagrams.gauze.tools import gather, in_the_way
 from diagrams.keyhole.diagram import make_keyhole_diagram
+from diagrams.keyhole.live import LIVE
 from diagrams.keyhole.metrics import measure
 from diagrams.keyhole.operation import LOG_PERIOD, length, outline, prepare
 from diagrams.keyhole.plots import plots
@@ -105,5 +106,6 @@ STUDY = Study(
     prepare=prepare,
     outline=outline,
     replay_length=60.0,
+    live=LIVE,
 )
 """The operation through one trocar."""

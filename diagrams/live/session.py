@@ -1,13 +1,11 @@
-"""A gauze delivery in real time: the surgeon's tools follow sliders or the keyboard.
+"""A scenario in real time: whoever watches, or another program, takes part.
 
-Sliders, buttons and read-outs are Meshcat's own. What every hand did is kept as a
-recording; a scenario that plays them back is the run that was seen.
+What is done is a tape for each that is guided, and faults that begin when a button was
+pressed; the scenario that plays them back is the run that was seen.
 """
 
-from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import dataclass, replace
-import itertools
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter, sleep
 from typing import Any
@@ -17,195 +15,271 @@ from pydrake.common import RandomGenerator
 from pydrake.geometry import MeshcatVisualizer, MeshcatVisualizerParams, Role
 from pydrake.systems.framework import DiagramBuilder
 
+from diagrams.common.live import Figure, Live
+from diagrams.common.progress import silent
 from diagrams.common.replay import QUERY_PORT, dress
 from diagrams.common.run import start
-from diagrams.common.scenario import ScenarioError
-from diagrams.gauze.diagram import make_gauze_diagram
-from diagrams.gauze.tools import HandTool, hands
-from diagrams.studies import get_study
-from plants.surgeon.guided_tool import GuidedTool
-from plants.surgeon.hunting_tool import Hunt
-from plants.surgeon.recording import save_recording
-from systems.common.signal import view
-from systems.common.signals import Force, RobotTool, Shaft
-from systems.common.stops import Stop
+from diagrams.common.scenario import ScenarioError, refusals
+from diagrams.live.page import Page
+from diagrams.studies import STUDIES, build, check_scenario, get_study
+from plants.faults.fault import Fault
+from systems.common.signal import flat, view
+from systems.common.tape import save_tape
 
-FRAME = 1.0 / 30.0
-"""Between two looks at the sliders [s]."""
-_READ = 3
-"""Frames between two updates of the read-outs."""
-_RANGE = 0.16
-"""Of a slider about the tool's trocar [m]."""
-KEYS = (
-    (("KeyA", "KeyD"), ("KeyS", "KeyW"), ("KeyQ", "KeyE")),
-    (("ArrowLeft", "ArrowRight"), ("ArrowDown", "ArrowUp"), ("PageDown", "PageUp")),
-)
-"""Of the first obstacle, then of the target: less and more of x, y and z."""
-BUTTONS = ("pause", "push", "reset", "another seed", "end and save")
+DRAWN = 1.0 / 30.0
+"""Between two pictures, and what other programs are told [s]."""
+READ = 0.1
+"""Between two updates of the figures [s]."""
+NEVER = 1e5
+"""When a fault begins that nobody has asked for [s]."""
+USUAL = ("pause", "reset", "another seed", "end and save")
+"""Buttons of every session, about those of the system."""
 
 
-@dataclass(frozen=True)
-class ReadOut:
-    """A figure that is shown while it runs, as a slider that nobody moves."""
-
-    name: str
-    low: float
-    high: float
-    step: float
-    value: Callable[["Session"], float]
-
-
-def _gap(session: "Session") -> float:
-    return 1e3 * float(session.port("clearance").min())
-
-
-def _force(session: "Session") -> float:
-    return float(np.linalg.norm(view(Force, session.port("wall.force")).f))
-
-
-def _speed(session: "Session") -> float:
-    return 1e3 * session.speed_of_robot
-
-
-READ_OUTS = (
-    ReadOut("> clearance [mm]", -5.0, 100.0, 0.1, _gap),
-    ReadOut("> wall force [N]", 0.0, 10.0, 0.01, _force),
-    ReadOut("> speed [mm/s]", 0.0, 150.0, 1.0, _speed),
-)
+def spans(starts: list[float], lasting: float) -> list[tuple[float, float]]:
+    """From when to when something is on that lasts so long after each of its starts."""
+    found: list[tuple[float, float]] = []
+    for struck in starts:
+        goes_on = found and struck <= found[-1][1]
+        first = found.pop()[0] if goes_on else struck
+        found.append((first, struck + lasting))
+    return found
 
 
 class Session:
     """One go at a scenario; `frame` steps it, `save` keeps what was done.
 
     Attributes:
-        scenario: What runs.
+        case: What runs, prepared.
+        scenario: Its scenario, whatever moves by itself what is guided taken away.
         time: Simulated [s].
+        speed: Of the robot [m/s].
         is_paused: Whether time stands.
         is_over: Whether somebody has ended it.
         lag: How far the frames were behind the clock [s], one a frame.
-        stop: Why the robot stands; moving if it does not.
+        words: Why the robot stands, or what it does.
     """
 
-    def __init__(self, scenario: Any, meshcat: Any) -> None:
-        """Builds diagram, sliders and buttons.
+    def __init__(
+        self, scenario: Any, page: Page | None, tracker: Any = None, stream: Any = None
+    ) -> None:
+        """Builds the diagram and its page.
 
         Args:
-            scenario: Of a gauze delivery.
-            meshcat: Where it is shown.
+            scenario: Of a system that can be run live.
+            page: Where it is shown; None for nowhere.
+            tracker: A `connect.tracker.Tracker` that sees tools.
+            stream: A `connect.stream.Stream` that tells what is where.
 
         Raises:
-            ScenarioError: If it is of another system.
+            ScenarioError: If its system cannot be run live, or has no tracker.
         """
-        if scenario.system != "gauze":
-            raise ScenarioError(
-                f"system={scenario.system!r}: live is for gauze deliveries as yet, "
-                "e.g. gauze_dynamic"
-            )
-        self._meshcat = meshcat
+        study = get_study(scenario.system)
+        if study.live is None:
+            able = ", ".join(name for name, other in STUDIES.items() if other.live)
+            raise ScenarioError(f"system={study.name!r}: expected one of {able}")
+        self._study, self._live = study, study.live
+        self._every = {
+            seconds: max(1, round(seconds / study.live.frame))
+            for seconds in (DRAWN, READ)
+        }
+        self._page, self._tracker, self._stream = page, tracker, stream
         self.is_paused = self.is_over = False
         self.lag: list[float] = []
-        self._clicks = dict.fromkeys(BUTTONS, 0)
-        for name in meshcat.GetSliderNames():
-            meshcat.DeleteSlider(name)
-        for name in meshcat.GetButtonNames():
-            meshcat.DeleteButton(name)
-        for name in BUTTONS:
-            meshcat.AddButton(name, "Space" if name == "pause" else "")
-        for out in READ_OUTS:
-            meshcat.AddSlider(out.name, out.low, out.high, out.step, out.low)
+        self.words = ""
         self._begin(scenario)
 
     def _begin(self, scenario: Any) -> None:
         """Begins anew."""
-        self.scenario = scenario
-        tools = hands(scenario.tools, scenario.seed)
-        swaps = {f"{n}_tool": GuidedTool(_held(tool)) for n, tool in tools.items()}
+        self._asked = scenario
+        live: Live = self._live
+        played = deepcopy(scenario)
+        seen = self._tracker.tools if self._tracker else ()
+        self._guided = [one for one in live.tracked(played) if one.name in seen]
+        if self._page:
+            self._guided += [o for o in live.guided(played) if o.name not in seen]
+        if self._guided:
+            played = live.held(played, [one.name for one in self._guided])
+        for one in self._guided:
+            setattr(one.owner(played), one.field, "")
+        self._first_switch = len(played.faults)
+        self._switches = live.switches(played) if self._page else []
+        played.faults = played.faults + [
+            Fault(s.kind, NEVER, s.lasting, s.size) for s in self._switches
+        ]
+        check_scenario(played)
+        self.scenario = played
+        with refusals():
+            self.case = self._study.prepare(played, silent)
         builder = DiagramBuilder()
-        still = deepcopy(scenario)
-        still.tools = [_held(t) if isinstance(t, HandTool) else t for t in still.tools]
-        self._station = builder.AddNamedSystem(
-            "station", make_gauze_diagram(still, swaps)
-        )
-        self._visualizer = MeshcatVisualizer.AddToBuilder(
-            builder,
-            self._station.GetOutputPort(QUERY_PORT),
-            self._meshcat,
-            MeshcatVisualizerParams(
-                role=Role.kIllustration, prefix="scene", publish_period=1e6
-            ),
-        )
-        root = builder.Build()
-        study = get_study(scenario.system)
-        dress(self._meshcat, study.view)
-        self._simulator = start(root, study.integrator(scenario))
+        self.station = builder.AddNamedSystem("station", build(self.case))
+        self._visualizer = None
+        if self._page and self.station.HasOutputPort(QUERY_PORT):
+            self._visualizer = MeshcatVisualizer.AddToBuilder(
+                builder,
+                self.station.GetOutputPort(QUERY_PORT),
+                self._page.meshcat,
+                MeshcatVisualizerParams(
+                    role=Role.kIllustration, prefix="scene", publish_period=1e6
+                ),
+            )
+        self._root = builder.Build()
+        self._simulator = start(self._root, self._study.integrator(played))
         self._context = self._simulator.get_mutable_context()
-        root.SetRandomContext(self._context, RandomGenerator(scenario.seed))
+        self._root.SetRandomContext(self._context, RandomGenerator(played.seed))
         self._simulator.Initialize()
-        self.time, self._count, self.speed_of_robot = 0.0, 0, 0.0
-        self.stop = Stop.WAITING
-        self._hands = {}
-        for (name, tool), keys in zip(_ordered(tools), itertools.cycle(KEYS)):
-            self._hands[name] = Hand(name, tool, swaps[f"{name}_tool"], keys)
-            self._hands[name].show(self._meshcat)
-        self._tip = self._robot()
+        self.time, self._count, self.speed = 0.0, 0, 0.0
+        self._struck: list[list[float]] = [[] for _ in self._switches]
+        self._acts = live.acts(played) if self._page else {}
+        self._figures = live.figures(played)
+        if live.moving:
+            most = 1e3 * live.fastest
+            self._figures.append(
+                Figure("speed [mm/s]", lambda session: session.speed, 0.0, most, 1.0)
+            )
+            self._point = np.array(live.moving(self))
+        self._said: dict[str, list[tuple[float, np.ndarray]]] = {}
+        for one in self._guided:
+            self._said[one.name] = []
+        if self._page:
+            dress(self._page.meshcat, self._study.view)
+            labels = [s.label for s in self._switches]
+            buttons = [USUAL[0], *self._acts, *labels, *USUAL[1:]]
+            by_hand = [one for one in self._guided if one.sliders]
+            self._page.lay_out(by_hand, buttons, self._figures)
+        self._draw()
+        self._show()
 
-    def port(self, name: str) -> np.ndarray:
-        """An exported signal of the diagram, now."""
-        told: Any = self._station.GetOutputPort(name)
-        context = self._station.GetMyContextFromRoot(self._context)
+    def values(self, port: str) -> np.ndarray:
+        """Elements of an exported signal of the diagram, now."""
+        told = self.station.GetOutputPort(port)
+        context = self.station.GetMyContextFromRoot(self._context)
         return np.array(told.Eval(context))
 
-    def _robot(self) -> np.ndarray:
-        tip: np.ndarray = view(RobotTool, self.port("robot.tool")).tip
-        return tip
+    def read(self, port: str, signal: Any) -> Any:
+        """An exported signal of the diagram, now."""
+        return view(signal, self.values(port))
+
+    def wanted(self, name: str) -> np.ndarray:
+        """What was said last of what is guided."""
+        one = next(one for one in self._guided if one.name == name)
+        rows = self._said[name]
+        return rows[-1][1] if rows else flat(one.rest)
+
+    def put(self, name: str, value: Any) -> None:
+        """Moves the sliders of what is guided, if somebody guides it here."""
+        for one in self._guided:
+            if one.name == name and self._page and one.sliders:
+                self._page.put(one, value)
 
     def frame(self) -> None:
-        """Reads sliders and buttons, and simulates a frame if it is not paused."""
+        """Hears what is outside, and simulates a frame if it is not paused."""
+        if self._tracker:
+            self._tracker.poll()
         self._obey()
         if self.is_paused or self.is_over:
             return
-        for hand in self._hands.values():
-            hand.guide(self._meshcat, self._context)
+        self._hear()
         self._count += 1
-        self.time = self._count * FRAME
+        self.time = self._due()
+        if self._is_due(DRAWN, 1):
+            self._study.adjust(self.case, self.station, self._context)
         self._simulator.AdvanceTo(self.time)
-        tip = self._robot()
-        self.speed_of_robot = float(np.linalg.norm(tip - self._tip)) / FRAME
-        self._tip = tip
-        for name, hand in self._hands.items():
-            hand.keep(self.time, view(Shaft, self.port(f"{name}.shaft")).tip)
-        context = self._visualizer.GetMyContextFromRoot(self._context)
-        self._visualizer.ForcedPublish(context)
-        if self._count % _READ == 0:
-            for out in READ_OUTS:
-                value = float(np.clip(out.value(self), out.low, out.high))
-                self._meshcat.SetSliderValue(out.name, value)
+        if self._live.moving:
+            point = np.array(self._live.moving(self))
+            self.speed = float(np.linalg.norm(point - self._point)) / self._live.frame
+            self._point = point
+        if self._is_due(DRAWN):
+            self._draw()
             self._tell()
+        if self._is_due(READ):
+            self._show()
 
-    def _tell(self) -> None:
-        """Says why the robot stands, once."""
-        code = round(float(self.port("navigation.stop")[0]))
-        now = next(stop for stop in Stop if stop == code)
-        if now != self.stop:
-            print(f"{self.time:7.2f} s  {now.text}")
-        self.stop = now
+    def _due(self) -> float:
+        """When the frame ends [s].
+
+        Every so often it is a frame of the replay, whose time is taken to the last
+        digit: the integrator takes a step for a difference of that.
+        """
+        shown = 1.0 / self._study.frame_rate
+        every = max(1, round(shown / self._live.frame))
+        frames, rest = divmod(self._count, every)
+        return self._count * self._live.frame if rest else frames * shown
+
+    def _is_due(self, seconds: float, since: int = 0) -> bool:
+        """Whether something is to be done that comes so often, `since` frames later."""
+        return (self._count - since) % self._every[seconds] == 0
+
+    def _hear(self) -> None:
+        """Says in the diagram what people and other programs say."""
+        if self._page:
+            self._page.move_by_gamepad(self._live.frame)
+        for one in self._guided:
+            before = self.wanted(one.name)
+            if one.sliders and self._page:
+                value = self._page.wanted(one)
+            elif self._tracker and not one.sliders:
+                last = view(one.signal, before)
+                value = flat(self._tracker.sighting(one.name, last))
+            else:
+                value = before
+            rows = self._said[one.name]
+            if rows and np.array_equal(value, before):
+                continue
+            rows.append((self._context.get_time(), value))
+            block = self.station.GetSubsystemByName(f"{one.name}_outside")
+            block.say(self._context, value)
 
     def _obey(self) -> None:
         """Does what the buttons say."""
-        for name in BUTTONS:
-            clicks = self._meshcat.GetButtonClicks(name)
-            if clicks == self._clicks[name]:
-                continue
-            self._clicks[name] = clicks
-            if name == "pause":
-                self.is_paused = not self.is_paused
-            elif name == "push":
-                next(iter(self._hands.values())).send(self._meshcat, self._robot())
-            elif name == "end and save":
-                self.is_over = True
-            else:
-                more = int(name == "another seed")
-                self._begin(replace(self.scenario, seed=self.scenario.seed + more))
+        for name in self._page.clicked() if self._page else []:
+            self.press(name)
+
+    def press(self, name: str) -> None:
+        """Does what a button says."""
+        if name == "pause":
+            self.is_paused = not self.is_paused
+        elif name == "end and save":
+            self.is_over = True
+        elif name in ("reset", "another seed"):
+            more = int(name == "another seed")
+            self._begin(replace(self._asked, seed=self._asked.seed + more))
+        elif name in self._acts:
+            self._acts[name](self)
+        else:
+            labels = [switch.label for switch in self._switches]
+            self._strike(labels.index(name))
+
+    def _strike(self, index: int) -> None:
+        """Lets a fault begin, in all wires that it is in."""
+        if self.is_paused:
+            return
+        mark = f"fault{self._first_switch + index}_"
+        wires = [s for s in self.station.GetSystems() if s.get_name().startswith(mark)]
+        struck = {wire.strike(self._context) for wire in wires}
+        self._struck[index] += struck
+
+    def _draw(self) -> None:
+        if self._visualizer is not None:
+            context = self._visualizer.GetMyContextFromRoot(self._context)
+            self._visualizer.ForcedPublish(context)
+
+    def _show(self) -> None:
+        """Brings the figures up to date, and says why the robot stands, once."""
+        words = self._live.words(self)
+        if self._tracker:
+            words = "; ".join(filter(None, [words, f"tracker {self._tracker.told()}"]))
+        if words != self.words:
+            print(f"{self.time:7.2f} s  {words}")
+        self.words = words
+        if self._page:
+            values = [figure.value(self) for figure in self._figures]
+            self._page.show(values, words)
+
+    def _tell(self) -> None:
+        """Tells other programs what is where."""
+        if self._stream:
+            self._stream.tell(self._live.streamed(self), self.words)
 
     def play(self, duration: float, speed: float = 1.0) -> None:
         """Runs in real time until it is over or has lasted so long.
@@ -217,7 +291,7 @@ class Session:
         due = perf_counter()
         while self.time < duration - 1e-9 and not self.is_over:
             self.frame()
-            due += FRAME / speed
+            due += self._live.frame / speed
             late = perf_counter() - due
             self.lag.append(max(0.0, late))
             if late < 0.0:
@@ -226,10 +300,10 @@ class Session:
                 due += late  # what is lost is not made up for in a rush
 
     def save(self, folder: Path) -> Any:
-        """Writes the recording of every hand.
+        """Writes the tape of all that was guided.
 
         Returns:
-            The scenario that plays them back.
+            The scenario that plays it back.
 
         Raises:
             ScenarioError: If nothing was simulated.
@@ -238,69 +312,16 @@ class Session:
             raise ScenarioError("nothing to save: the run was ended before it began")
         folder.mkdir(parents=True, exist_ok=True)
         played = deepcopy(self.scenario)
-        for tool in played.tools:
-            if isinstance(tool, HandTool):
-                path = folder / f"{tool.name}_recording.csv"
-                self._hands[tool.name].save(path)
-                tool.recording = str(path.absolute())
-                tool.hunt, tool.pushes, tool.tremor_rms = Hunt(), [], 0.0
-        return replace(played, duration=self.time)
-
-
-class Hand:
-    """One of the surgeon's hands: its sliders, and what it did."""
-
-    def __init__(self, name: str, tool: HandTool, block: Any, keys: Any) -> None:
-        self._name, self._block, self._keys = name, block, keys
-        self._start = np.array(tool.points[0])
-        self._middle = np.array(tool.p_WG)
-        self._path: list[tuple[float, np.ndarray]] = [(0.0, self._start)]
-
-    def _sliders(self) -> list[str]:
-        return [f"{self._name} {axis} [mm]" for axis in "xyz"]
-
-    def show(self, meshcat: Any) -> None:
-        """Adds the sliders, or brings them back to the start."""
-        known = meshcat.GetSliderNames()
-        for axis, name in enumerate(self._sliders()):
-            middle = 1e3 * self._middle[axis]
-            low, high = middle - 1e3 * _RANGE, middle + 1e3 * _RANGE
-            if axis == 2:
-                high = middle - 20.0
-            if name in known:
-                meshcat.SetSliderValue(name, 1e3 * self._start[axis])
-            else:
-                less, more = self._keys[axis]
-                value = 1e3 * self._start[axis]
-                meshcat.AddSlider(name, low, high, 1.0, value, less, more)
-
-    def guide(self, meshcat: Any, root: Any) -> None:
-        """Tells the tool where the sliders are."""
-        wanted = [1e-3 * meshcat.GetSliderValue(name) for name in self._sliders()]
-        context = self._block.GetMyMutableContextFromRoot(root)
-        self._block.GetInputPort("wanted").FixValue(context, np.array(wanted))
-
-    def send(self, meshcat: Any, point: np.ndarray) -> None:
-        """Moves the sliders to a point in W."""
-        for axis, name in enumerate(self._sliders()):
-            meshcat.SetSliderValue(name, 1e3 * float(point[axis]))
-
-    def keep(self, time: float, tip: np.ndarray) -> None:
-        """Remembers where the tip was."""
-        self._path.append((time, np.array(tip)))
-
-    def save(self, path: Path) -> None:
-        """Writes the recording."""
-        times, points = zip(*self._path, strict=True)
-        save_recording(path, np.array(times), np.array(points))
-
-
-def _held(tool: HandTool) -> HandTool:
-    """The tool at its first place, with nothing that moves it."""
-    held = replace(tool, times=[0.0], points=tool.points[:1], recording=None)
-    return replace(held, pushes=[], hunt=Hunt(), tremor_rms=0.0)
-
-
-def _ordered(tools: dict[str, HandTool]) -> list[tuple[str, HandTool]]:
-    """Obstacles first: they have the keys in the left hand."""
-    return sorted(tools.items(), key=lambda item: item[1].role == "target")
+        for one in self._guided:
+            path = folder / f"{one.name}_recording.csv"
+            times, rows = zip(*self._said[one.name], strict=True)
+            save_tape(path, one.signal, times, rows)
+            setattr(one.owner(played), one.field, str(path.absolute()))
+        faults = played.faults[: self._first_switch]
+        for switch, starts in zip(self._switches, self._struck, strict=True):
+            faults += [
+                Fault(switch.kind, start, end - start, switch.size)
+                # One that never was stays: its samples end the integrator's steps.
+                for start, end in spans(starts or [NEVER], switch.lasting)
+            ]
+        return replace(played, duration=self.time, faults=faults)

@@ -12,17 +12,20 @@ from diagrams.common.wiring import add_blocks, finish
 from diagrams.navigation.scenario import (
     NavigationScenario,
     discs,
+    driven,
     heading,
     mapping_params,
     walking,
 )
 from plants.crowd.crowd_motion import CrowdMotion
-from plants.crowd.obstacle_motion import ObstacleMotion
+from plants.crowd.guided_disc import GuidedDisc, GuidedDiscParams, Place
+from plants.crowd.obstacle_motion import ObstacleMotion, obstacle_at
 from plants.crowd.walls import segments
 from plants.turtlebot.arena import add_arena
 from plants.turtlebot.lidar import SCAN_NOISE, Lidar
 from plants.turtlebot.odometry import Odometry, OdometryNoise
 from plants.turtlebot.turtlebot import make_turtlebot
+from systems.common.outside import Outside
 from systems.common.signal import size
 from systems.perception.grid_mapping import GridMapping
 from systems.perception.tracking import Tracking
@@ -160,6 +163,13 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
         obstacles: Any = CrowdMotion(s.crowd, s.robot.radius)
     else:
         obstacles = ObstacleMotion(walking(s))
+    driver: dict[str, Any] = {}
+    if (row := driven(s)) is not None:
+        first = obstacle_at(s.obstacles[row], 0.0)
+        start = Place(first.x, first.y)
+        told = Outside(Place, start, s.obstacles[row].guided, PERIOD)
+        disc = GuidedDisc(GuidedDiscParams(period=PERIOD), start, row)
+        driver = {"obstacle_outside": told, "driven": disc}
     control = replace(
         s.control,
         speed=s.robot.speed,
@@ -169,6 +179,7 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     return {
         "robot": make_turtlebot(s.robot, [*s.start, heading(s)]),
         "obstacles": obstacles,
+        **driver,
         **(sense_blocks(s) if s.senses == "lidar" else given_blocks(s)),
         "goal": ConstantVectorSource(s.goal),
         "planner": make_planner(s),
@@ -218,4 +229,9 @@ def make_navigation_diagram(
     if scenario.crowd.people:
         wires.append(("robot.y0", "obstacles.robot"))
     exports = EXPORTS | (SENSED_EXPORTS if sensed else {})
+    if driven(scenario) is not None:
+        given, true = "obstacles.obstacles", "driven.obstacles"
+        wires = [(true if source == given else source, sink) for source, sink in wires]
+        wires += [(given, "driven.others"), ("obstacle_outside.told", "driven.wanted")]
+        exports["obstacles.rows"] = true
     return finish(builder, "navigation", systems, wires, exports, scenario.faults)

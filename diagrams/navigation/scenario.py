@@ -90,6 +90,8 @@ class NavigationScenario(Scenario):
         given = [bool(self.crowd.people), bool(self.obstacles), bool(self.recording)]
         one = "none together with others: obstacles, crowd.people or a recording"
         yield sum(given) <= 1, "obstacles", one
+        led = sum(obstacle.guided is not None for obstacle in self.obstacles)
+        yield led <= 1, "obstacles", "at most one that is guided"
         way = dist(self.start, self.goal)
         told = f"it more than reach={self.reach} m from the start, not {way:.3g}"
         yield way > self.reach, "goal", told
@@ -123,6 +125,12 @@ def discs(scenario: NavigationScenario) -> list[Obstacle]:
     if scenario.crowd.people:
         return starts(scenario.crowd)
     return [obstacle_at(params, 0.0) for params in walking(scenario)]
+
+
+def driven(scenario: NavigationScenario) -> int | None:
+    """Which of the obstacles somebody drives."""
+    rows = [k for k, o in enumerate(scenario.obstacles) if o.guided is not None]
+    return rows[0] if rows else None
 
 
 def mapping_params(scenario: NavigationScenario) -> GridMappingParams:

@@ -10,6 +10,7 @@ from pydrake.systems.analysis import SimulatorConfig
 from diagrams.common.replay import draw_trail
 from diagrams.common.study import Study, View
 from diagrams.navigation.diagram import floor, make_navigation_diagram
+from diagrams.navigation.live import LIVE
 from diagrams.navigation.metrics import measure
 from diagrams.navigation.perceived import decorate_perception
 from diagrams.navigation.plots import plots, state_names
@@ -103,4 +104,5 @@ STUDY = Study(
         max_step_size=0.05,
         use_error_control=False,
     ),
+    live=LIVE,
 )

@@ -8,13 +8,14 @@ from collections.abc import Iterable
 from pathlib import Path
 import shlex
 
-from diagrams.common.progress import progress_bar
+from diagrams.common.progress import Progress, progress_bar
 from diagrams.common.scenario import refusals
 from diagrams.resection.operation import finish_plan, new_session, reach_of, resumed
 from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.labels import TUMOUR
 from plants.tissue.mask import load_mask
-from systems.resection.planning.feasibility_map import feasibility_map
+from systems.resection.planning.feasibility import place
+from systems.resection.planning.feasibility_map import FeasibilityMap, feasibility_map
 from systems.resection.planning.next_entry import NextEntry, next_entries
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import (
@@ -26,7 +27,8 @@ from systems.resection.planning.procedure import (
     load_procedures,
     save_procedures,
 )
-from systems.resection.planning.session import Session
+from systems.resection.planning.reach import Reach
+from systems.resection.planning.session import Preview, Session
 
 HELP = """\
 entry LENGTH RADIUS                  propose an entry procedure [mm]
@@ -36,6 +38,7 @@ volume X Y Z NX NY NZ RADIUS         an elementary volume [mm]
 suggest                              propose what gains most of some the planner tries
 check | commit | undo                ask of the proposal, make it part of the plan
 map                                  where elementary volumes are feasible now
+reach                                what can be reached at all, and why the rest not
 finish                               let the planner do the rest
 entries | access N                   what further entries would add | take the N-th
 update FILE                          an image taken meanwhile replaces the mask
@@ -70,11 +73,24 @@ def procedure_from(words: list[str]) -> Procedure:
 class Console:
     """A session that takes lines and answers with text."""
 
-    def __init__(self, session: Session, scenario: ResectionScenario) -> None:
-        """Makes a console with nothing proposed."""
+    def __init__(
+        self,
+        session: Session,
+        scenario: ResectionScenario,
+        progress: Progress = progress_bar,
+    ) -> None:
+        """Makes a console with nothing proposed.
+
+        `preview` is how the proposal was found to go, `map` and `reach` are what was
+        found last; None before.
+        """
         self.session = session
         self.scenario = scenario
+        self.progress = progress
         self.proposal: Procedure | None = None
+        self.preview: Preview | None = None
+        self.map: FeasibilityMap | None = None
+        self.reach: Reach | None = None
         self.further: list[NextEntry] = []
 
     def answer(self, line: str) -> str:
@@ -82,12 +98,13 @@ class Console:
         try:
             words = shlex.split(line, comments=True)
             return self._do(words) if words else ""
-        except ValueError as error:
+        except (ValueError, OSError) as error:
             return f"error: {error}"
 
     def _do(self, words: list[str]) -> str:
         command = words[0]
         if command in (ENTRY, ELEMENTARY, VOLUME):
+            self.proposal = self.preview = None  # none is left after a bad line
             proposal = procedure_from(words)
             check_procedure(proposal, self.session.params)
             self.proposal = proposal
@@ -101,13 +118,18 @@ class Console:
         if command == "undo":
             return f"took back {self.session.undo().name}; {self._share()}"
         if command == "map":
-            return self._map()
+            self.map = feasibility_map(self.session)
+            return told_map(self.map)
+        if command == "reach":
+            self.reach = reach_of(self.session, self.scenario, self.progress)
+            return told_reach(self.reach)
         if command == "finish":
-            reach = reach_of(self.session, self.scenario, progress_bar)
-            reach = finish_plan(self.session, reach, self.scenario, progress_bar)
+            reach = reach_of(self.session, self.scenario, self.progress)
+            reach = finish_plan(self.session, reach, self.scenario, self.progress)
+            self.reach = reach
             return f"{self._share()}, {100 * reach.fraction:.1f} % are reachable"
         if command == "entries":
-            with progress_bar("further entries", "of those tried") as show:
+            with self.progress("further entries", "of those tried") as show:
                 self.further = next_entries(
                     self.session,
                     self.scenario.entries,
@@ -153,11 +175,10 @@ class Console:
         if not good:
             return "nothing that was tried gains enough; try `finish`"
         self.proposal = good[0]
-        position = ", ".join(f"{1e3 * v:.1f}" for v in good[0].position or [])
         axis = ", ".join(f"{v:.2f}" for v in good[0].axis())
         return (
-            f"{1e3 * good[0].length:.0f} mm from ({position}) mm along ({axis}): "
-            + (self._check())
+            f"{1e3 * good[0].length:.0f} mm from {place(good[0].position)} "
+            f"along ({axis}): " + (self._check())
         )
 
     def _load(self, path: Path) -> str:
@@ -170,7 +191,8 @@ class Console:
     def _check(self) -> str:
         if self.proposal is None:
             raise ValueError("nothing is proposed yet")
-        answer = self.session.check(self.proposal)
+        self.preview = self.session.preview(self.proposal)
+        answer = self.preview.answer
         return answer.text if answer.feasible else f"{answer.reason}: {answer.text}"
 
     def _commit(self) -> str:
@@ -179,21 +201,32 @@ class Console:
         answer = self.session.commit(self.proposal)
         if not answer.feasible:
             return f"{answer.reason}: {answer.text}"
-        self.proposal = None
+        self.proposal = self.preview = None
         return f"committed, {self._share()}"
-
-    def _map(self) -> str:
-        found = feasibility_map(self.session)
-        yes = found.feasible
-        rows = [f"feasible at {yes.sum()} of {len(yes)} points"]
-        for n in found.gained.argsort()[::-1][:5]:
-            if found.gained[n] > 0.0:
-                place = ", ".join(f"{1e3 * x:.1f}" for x in found.points[n])
-                rows.append(f"  {1e9 * found.gained[n]:.0f} mm3 at ({place}) mm")
-        return "\n".join(rows)
 
     def _share(self) -> str:
         return f"{100 * self.session.fraction:.1f} % of the tumour planned"
+
+
+def told_map(found: FeasibilityMap) -> str:
+    """A map as text: how much is feasible, and the five best places."""
+    yes = found.feasible
+    rows = [f"feasible at {yes.sum()} of {len(yes)} points"]
+    for n in found.gained.argsort()[::-1][:5]:
+        if found.gained[n] > 0.0:
+            rows.append(
+                f"  {1e9 * found.gained[n]:.0f} mm3 at {place(found.points[n])}"
+            )
+    return "\n".join(rows)
+
+
+def told_reach(reach: Reach) -> str:
+    """What can be reached as text, and why the five largest parts cannot."""
+    rows = [f"{100 * reach.fraction:.1f} % of the tumour can be reached"]
+    for lump in reach.lumps[:5]:
+        volume = f"{1e9 * lump.volume:.0f} mm3"
+        rows.append(f"  not {volume} at {place(lump.where)}: {lump.reason}")
+    return "\n".join(rows)
 
 
 def open_session(scenario: ResectionScenario, file: Path) -> Session:

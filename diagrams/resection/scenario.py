@@ -62,6 +62,11 @@ class ResectionScenario(Scenario):
         "synthetic tumour if empty",
         file=True,
     )
+    image: str = parameter(
+        "",
+        "the patient's own image, shown in slices in the browser (formats as a mask)",
+        file=True,
+    )
     labels: MaskLabels = part(MaskLabels)
     tumour: SyntheticTumour = part(SyntheticTumour)
     access: Access = part(Access)
@@ -124,7 +129,9 @@ class ResectionScenario(Scenario):
     rehearsal: RehearsalParams = part(RehearsalParams)
 
     def rules(self) -> Rules:
-        """Procedures are the robot's, and a mask is there."""
+        """Procedures are the robot's, and files are there."""
         for index, procedure in enumerate(self.procedures):
             check_procedure(procedure, self.snake, f"procedures[{index}]")
-        yield not self.mask or Path(self.mask).is_file(), "mask", "a file that is there"
+        for name in ("mask", "image"):
+            file = getattr(self, name)
+            yield not file or Path(file).is_file(), name, "a file that is there"

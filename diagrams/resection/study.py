@@ -6,6 +6,7 @@ from typing import Any
 
 from diagrams.common.study import Study, View, cenic
 from diagrams.resection.diagram import make_resection_diagram
+from diagrams.resection.live import LIVE
 from diagrams.resection.metrics import measure
 from diagrams.resection.operation import (
     LOG_PERIOD,
@@ -79,5 +80,6 @@ STUDY = Study(
     prepare=prepare,
     outline=outline,
     replay_length=45.0,
+    live=LIVE,
 )
 """The resection of a tumour."""

@@ -15,8 +15,7 @@ import shutil
 import sys
 from typing import Any
 
-from diagrams.common.cli import extra
-from diagrams.common.scenario import ScenarioError
+from diagrams.common.scenario import ScenarioError, extra
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent
@@ -26,6 +25,7 @@ FLOORS = {
     "plants": "What obeys",
 }
 _LINK = re.compile(r"(\]\()([^)#\s:]+)((?:#[^)]*)?\))")
+_CODE = re.compile(r"(?<!\[)`([\w/]+\.py)(?:: [^`]+)?`")
 OVERVIEW = "overview.md"
 """The project's front page; the site has one of its own."""
 OWN = Path("diagrams/site/pages")
@@ -71,7 +71,7 @@ def place(page: Path) -> Path:
 def relinked(text: str, page: Path, taken: set[Path]) -> str:
     """A page's text with links that lead somewhere on the site.
 
-    A link to a folder means its page; one to a file that is no page becomes its text.
+    A link to a folder means its page; one to a file that is no page leads nowhere.
 
     Args:
         text: Of the page.
@@ -85,20 +85,50 @@ def relinked(text: str, page: Path, taken: set[Path]) -> str:
             if there in taken:
                 way = os.path.relpath(place(there), place(page).parent)
                 return f"{match[1]}{way}{match[3]}"
-        return f"{match[1]}#{match[3]}"  # a file of the source
+        if not (ROOT / target).exists():
+            return match[0]  # a dead link: MkDocs says so
+        return f"{match[1]}#{match[3]}"  # of the source
 
     return _LINK.sub(link, text)
 
 
-def copy_pages(folder: Path) -> None:
-    """Copies all pages into a folder, links made good."""
+def referred(text: str, page: Path, rooms: Sequence[Path]) -> str:
+    """A page's text whose `file.py: name` lead to the file's docstrings.
+
+    Args:
+        text: Of the page.
+        page: Where it lies, relative to the project's folder.
+        rooms: That are in the reference.
+    """
+
+    def link(match: re.Match[str]) -> str:
+        for file in (page.parent / match[1], Path(match[1])):
+            room = Path(*file.parts[:2])
+            if room in rooms and (ROOT / file).exists():
+                there = f"reference/{'.'.join(room.parts)}.md"
+                way = os.path.relpath(there, place(page).parent)
+                return f"[{match[0]}]({way}#{'.'.join(file.with_suffix('').parts)})"
+        return match[0]
+
+    parts = text.split("```")
+    parts[::2] = [_CODE.sub(link, part) for part in parts[::2]]
+    return "```".join(parts)
+
+
+def copy_pages(folder: Path, rooms: Sequence[Path]) -> None:
+    """Copies all pages into a folder, links made good.
+
+    Args:
+        folder: To copy to.
+        rooms: That are in the reference.
+    """
     taken = set(pages())
     for page in sorted(taken):
         there = folder / place(page)
         there.parent.mkdir(parents=True, exist_ok=True)
         if page.suffix == ".md":
             text = (ROOT / page).read_text()
-            there.write_text(relinked(text, page, taken))
+            there.write_text(referred(relinked(text, page, taken), page, rooms))
         else:
             shutil.copyfile(ROOT / page, there)
 
@@ -219,11 +249,11 @@ def build_site(
     if out.exists() and any(out.iterdir()) and not (out / MARK).exists():
         raise SiteError(f"{out}: expected a new folder, or one of an earlier site")
     shutil.rmtree(out, ignore_errors=True)
-    copy_pages(pages_)
-    (out / MARK).touch()
-    (pages_ / "reference").mkdir()
     if rooms is None:
         rooms = [room for floor in FLOORS for room in rooms_of(floor)]
+    copy_pages(pages_, rooms)
+    (out / MARK).touch()
+    (pages_ / "reference").mkdir()
     write_reference(pages_ / "reference", rooms)
     first = ""
     if runs:

@@ -4,8 +4,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from pydrake.common import RandomDistribution
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import RandomSource
 
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.snake.scenario import ELASTIC_STEP, SnakeScenario
@@ -14,12 +17,17 @@ from plants.snake.elastic_wires import ElasticWires
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.looks import draw_channel
 from plants.snake.parameters import SnakeParams
+from plants.snake.signals import Drums
 from plants.snake.snake import add_snake, set_default_posture
+from systems.common.outside import Outside
+from systems.common.signal import size
 from systems.resection.wires.ball_location import BallLocation
+from systems.resection.wires.hysteresis_compensation import HysteresisCompensation
 from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tip_reference import TipReference, reference
 from systems.resection.wires.tool_load import ToolLoad
+from systems.resection.wires.tool_tracker import PoseNoise, ToolTracker
 from systems.resection.wires.wire_drums import WireDrums
 from systems.resection.wires.wire_forward_actuation import WireForwardActuation
 from systems.resection.wires.wire_inverse_actuation import (
@@ -66,10 +74,17 @@ ELASTIC_WIRES = (
 STATICS_WIRES = (
     ("wire_drums.lengths", "wire_statics.lengths"),
     ("wire_drums.rates", "wire_statics.rates"),
+    ("snake_location.tool", "tool_load.tool"),
     ("tool_load.force", "wire_statics.force"),
     ("wire_statics.desired_state", "plant.snake_desired_state"),
     ("wire_statics.tension", "wire_watch.tension"),
     ("wire_statics.stability", "wire_watch.stability"),
+)
+
+TRACKER_WIRES = (
+    ("snake_location.tool", "tool_tracker.tool"),
+    ("tracker_noise.output", "tool_tracker.noise"),
+    ("tool_tracker.measured", "wire_inverse_actuation.measured"),
 )
 
 WIRES_OF = {
@@ -105,13 +120,28 @@ EXPORTS_OF = {
     },
 }
 
+HAND = ("wires_outside.told", "wire_drums.command")
+"""The wire of a hand that winds the drums in the inverse actuation's place."""
+
 CHANNEL_CLEARANCE = 1.0e-3
 """Between the snake's body and the access channel, in m; drawn only."""
 
 
 def start_posture(scenario: SnakeScenario) -> list[float]:
     """The posture (7) that the tip's reference begins with."""
-    return tool_postures(*reference(scenario.tip, 0.0), scenario.snake).x.tolist()
+    target = reference(scenario.tip, 0.0, scenario.snake)
+    return tool_postures(*target, scenario.snake).x.tolist()
+
+
+def start_lengths(scenario: SnakeScenario) -> list[float]:
+    """What is wound out at the start: nine wires, and the translation [m] (10)."""
+    s = scenario
+    core = s.core if s.wires == "statics" else PAPERS
+    wound = s.inverse_actuation
+    if s.wires != "drums":
+        wound = replace(wound, stiffness=s.drive.wire_stiffness)
+    lengths = wound_lengths(start_posture(s), wound, s.snake, s.drive, core)
+    return np.ravel(lengths).tolist()
 
 
 def wire_chain(
@@ -164,7 +194,7 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, posture = scenario, start_posture(scenario)
     blocks: dict[str, Any] = {
-        "tip_reference": TipReference(replace(s.tip, lead=s.period))
+        "tip_reference": TipReference(replace(s.tip, lead=s.period), s.snake)
     }
     if s.wires == "drums":
         return blocks | drum_chain(s, s.snake, posture)
@@ -178,13 +208,30 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
             ),
             "elastic_wires": ElasticWires(s.elastic, s.snake, s.drive),
         }
-    return {
-        **blocks,
+    blocks |= {
         **wire_chain(s, s.snake, posture, s.core, stiffness=stiffness),
         "snake_location": BallLocation(s.snake),
-        "tool_load": ToolLoad(s.load),
-        "wire_statics": WireStatics(s.snake, s.drive, s.core, s.period, posture),
+        "tool_load": ToolLoad(replace(s.load, period=s.period)),
+        "wire_statics": WireStatics(
+            s.snake, s.drive, s.core, s.period, posture, s.friction
+        ),
     }
+    if s.compensation != "none":
+        # In place of the paper's map from a posture to drums.
+        blocks["wire_inverse_actuation"] = HysteresisCompensation(
+            replace(s.hysteresis, period=s.period),
+            s.inverse_actuation,
+            s.snake,
+            s.drive,
+            s.core,
+            posture,
+        )
+    if s.compensation == "tracked":
+        blocks["tool_tracker"] = ToolTracker(s.tracker)
+        blocks["tracker_noise"] = RandomSource(
+            RandomDistribution.kGaussian, size(PoseNoise), s.tracker.period
+        )
+    return blocks
 
 
 def make_snake_diagram(
@@ -219,8 +266,16 @@ def make_snake_diagram(
     draw_channel(plant, plant.world_body(), channel)
     plant.Finalize()
     set_default_posture(plant, snake, start_posture(scenario))
-    blocks = add_blocks(builder, make_blocks(scenario), swaps)
+    made, wires = make_blocks(scenario), WIRES + WIRES_OF[scenario.wires]
+    if scenario.compensation == "tracked":
+        wires += TRACKER_WIRES
+    if scenario.guided is not None:
+        *lengths, s = start_lengths(scenario)
+        rest = Drums(tuple(lengths), s)
+        tape, period = scenario.guided, scenario.period
+        made["wires_outside"] = Outside(Drums, rest, tape, period)
+        wires = (*(wire for wire in wires if wire[1] != HAND[1]), HAND)
+    blocks = add_blocks(builder, made, swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
-    wires = WIRES + WIRES_OF[scenario.wires]
     exports = EXPORTS | EXPORTS_OF[scenario.wires]
     return finish(builder, "snake", systems, wires, exports, scenario.faults)

@@ -4,6 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from systems.resection.wires.tip_reference import turned
+
 SETTLED = 0.3
 """Errors at a pose count over the last so many seconds of its dwell."""
 
@@ -54,7 +56,7 @@ def measure(run: Any) -> dict[str, Any]:
         "max_pose_error": float(position.max()) if some else None,
         "rms_pose_error": float(np.sqrt(np.mean(position**2))) if some else None,
         "max_axis_error": float(angle.max()) if some else None,
-        **_balls(run, alarm if lost else None),
+        **_balls(run, alarm, lost),
         "min_tension": float(tension.min()),
         "max_tension": float(tension.max()),
         "break_detection_time": alarm - snapped if found and snapped else None,
@@ -63,14 +65,46 @@ def measure(run: Any) -> dict[str, Any]:
     }
 
 
-def _balls(run: Any, buckled: float | None) -> dict[str, Any]:
+def _balls(run: Any, alarm: float, lost: bool) -> dict[str, Any]:
     """How far the balls of a module part, and whether the snake stayed."""
     if run.scenario.wires != "statics":
         return {"max_coupler_error": float(run.snake.coupler_error.angle.max())}
-    gaps = run.snake.gaps
+    gaps, (error, _) = run.snake.gaps, errors(run)
     return {
+        "rms_tool_error": float(np.sqrt(np.mean(error**2))),
+        "max_tool_error": float(error.max()),
         "max_split": float(gaps.split.max()),
         "max_torsion": float(np.abs(gaps.torsion).max()),
         "least_eigenvalue": float(run.wires.stability.least_eigenvalue.min()),
-        "buckled_at": buckled,
+        "loop_width": loop_width(run),
+        "buckled_at": alarm if lost else None,
+        "stops": int(alarm >= 0.0),
     }
+
+
+def swings(run: Any) -> np.ndarray:
+    """The tool in the last whole swing, there and back, (n, 2, 3) in m.
+
+    Each row has it twice at the same bend asked for: on the way to the one side, and
+    on the way back. Without a whole swing there are none.
+    """
+    time, tip, tool = run.signals["time"], run.scenario.tip, run.snake.tool.p
+    turns = np.array([turned(tip.circle, t) for t in time]) / (2 * np.pi)
+    last = np.floor(turns[-1] - 1.25)  # from one end back at 1/4, there until 5/4
+    if tip.way != "swing" or tip.poses or last < 0:
+        return np.empty((0, 2, 3))
+    quarter = np.linspace(-0.25, 0.25, 201)
+    there, back = last + 1.0 + quarter, last + 0.5 - quarter
+
+    def at(turn: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.interp(turn, turns, column) for column in tool.T])
+
+    return np.stack([at(there), at(back)], axis=1)
+
+
+def loop_width(run: Any) -> float | None:
+    """How far apart the tool is there and back at most, in m; None without a swing."""
+    pairs = swings(run)
+    if not len(pairs):
+        return None
+    return float(np.linalg.norm(pairs[:, 0] - pairs[:, 1], axis=1).max())

@@ -6,20 +6,26 @@ from diagrams.common.scenario import Scenario, ScenarioError
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.elastic_wires import ElasticWiresParams
+from plants.snake.friction import SnakeFrictionParams
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.parameters import SnakeParams
 from plants.snake.reachability import why_not
 from plants.snake.signals import ToolTarget
 from systems.common.parameter import Rules, parameter, part
+from systems.resection.wires.hysteresis_compensation import (
+    HysteresisCompensationParams,
+)
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tip_reference import TipReferenceParams, reference
 from systems.resection.wires.tool_load import ToolLoadParams
+from systems.resection.wires.tool_tracker import ToolTrackerParams
 from systems.resection.wires.wire_drums import WireDrumsParams
 from systems.resection.wires.wire_inverse_actuation import WireInverseActuationParams
 from systems.resection.wires.wire_tension import WireTensionParams
 from systems.resection.wires.wire_watch import WireWatchParams
 
 WIRE_MODELS = ("drums", "elastic", "statics")
+COMPENSATIONS = ("none", "model", "tracked")
 
 ELASTIC_STEP = 4e-4
 """Step in s of the elastic-wire variant: its springs are explicit. At 0.5 ms the
@@ -44,6 +50,9 @@ class SnakeScenario(Scenario):
         "in which each ball turns as wires, core and load have it",
         choices=WIRE_MODELS,
     )
+    guided: str | None = parameter(
+        None, "tape of the drums' commands, wound by hand; '': live", file=True
+    )
     snake: SnakeParams = part(SnakeParams)
     drive: SnakeDriveParams = part(SnakeDriveParams)
     tip: TipReferenceParams = part(TipReferenceParams)
@@ -53,6 +62,14 @@ class SnakeScenario(Scenario):
     tension: WireTensionParams = part(WireTensionParams)
     elastic: ElasticWiresParams = part(ElasticWiresParams)
     core: SnakeCoreParams = part(SnakeCoreParams)
+    friction: SnakeFrictionParams = part(SnakeFrictionParams)
+    compensation: str = parameter(
+        "none",
+        "of friction and load: none, by a model, or by a model and a tracked tool",
+        choices=COMPENSATIONS,
+    )
+    hysteresis: HysteresisCompensationParams = part(HysteresisCompensationParams)
+    tracker: ToolTrackerParams = part(ToolTrackerParams)
     load: ToolLoadParams = part(ToolLoadParams)
     watch: WireWatchParams = part(WireWatchParams)
 
@@ -60,17 +77,24 @@ class SnakeScenario(Scenario):
         """Wires know what is asked of them, and the tool's way is within reach."""
         slack = not self.elastic.breaks or self.wires == "elastic"
         yield slack, "elastic.breaks", "none but of wires='elastic', that can go slack"
-        loaded = not any(self.load.force) or self.wires == "statics"
-        yield loaded, "load.force", "zero without wires='statics', that know a force"
-        for name, target in _targets(self.tip):
+        free, told = self.wires == "statics", "without wires='statics'"
+        yield free or not any(self.load.force), "load.force", f"zero {told}"
+        yield free or not self.load.cutting, "load.cutting", f"zero {told}"
+        smooth = not (self.friction.wire or self.friction.socket)
+        yield free or smooth, "friction", f"none {told}, that know it"
+        plain = self.compensation == "none"
+        yield free or plain, "compensation", f"none {told}, that know friction"
+        for name, target in _targets(self.tip, self.snake):
             if not tool_postures(*target, self.snake).reached:
                 raise ScenarioError(f"{name}: {why_not(*target, self.snake)}")
 
 
-def _targets(tip: TipReferenceParams) -> list[tuple[str, ToolTarget]]:
-    """Every pose, or a whole turn of the circle, by its key."""
+def _targets(
+    tip: TipReferenceParams, snake: SnakeParams
+) -> list[tuple[str, ToolTarget]]:
+    """Every pose, or a whole turn of the way, by its key."""
     if tip.poses:
         return [(f"tip.poses[{i}]", p.target()) for i, p in enumerate(tip.poses)]
     turn = tip.circle.period
     times = [tip.circle.ramp + turn * k / 72 for k in range(72)]
-    return [("tip.circle", reference(tip, t)) for t in times]
+    return [(f"tip.{tip.way}", reference(tip, t, snake)) for t in times]

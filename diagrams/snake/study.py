@@ -10,6 +10,7 @@ from pydrake.systems.analysis import SimulatorConfig
 from diagrams.common.replay import draw_trail
 from diagrams.common.study import Study, View, cenic
 from diagrams.snake.diagram import make_snake_diagram
+from diagrams.snake.live import LIVE
 from diagrams.snake.metrics import break_time, measure
 from diagrams.snake.plots import plots, turns_in
 from diagrams.snake.scenario import SnakeScenario
@@ -101,4 +102,5 @@ STUDY = Study(
     integrator=integrator,
     view=View(camera=(0.060, -0.068, 0.048), target=(0.0, 0.0, 0.025)),
     frame_rate=FRAME_RATE,
+    live=LIVE,
 )

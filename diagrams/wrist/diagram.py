@@ -9,8 +9,12 @@ from diagrams.bedside.bedside import add_bedside
 from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.wrist.scenario import WristScenario
+from systems.common.outside import Outside
+from systems.common.signal import vector
+from systems.common.signals import Point
 from systems.motion.joint_commands import JointCommands
 from systems.passive_wrist.arc_navigation import ArcNavigation
+from systems.passive_wrist.hand_navigation import HandNavigation
 from systems.sensing.robot_location import RobotLocation
 from systems.sensing.tool_wrench import told_instrument
 
@@ -25,6 +29,9 @@ WIRES = (
     ("passive_wrist.pivot", "robot_location.fulcrum"),
     ("passive_wrist.pivot", "joint_commands.fulcrum"),
 )
+
+LED = ("tip_outside.told", "arc_navigation.wanted")
+"""The wire of a hand that leads the tip in the script's place."""
 
 EXPORTS = {
     "robot.tool": "robot_location.robot_tool",
@@ -52,10 +59,18 @@ def make_wrist_diagram(
     bedside = add_bedside(builder, scenario)
     robot = scenario.robot
     guess = [p + e for p, e in zip(robot.p_WG, scenario.first_guess, strict=True)]
+    is_led = scenario.guided is not None
+    navigation: Any = ArcNavigation(scenario.arcs, robot.p_WP, guess)
+    led: dict[str, Any] = {}
+    if is_led:
+        navigation = HandNavigation(scenario.hand, robot.p_WP, guess)
+        rest = Point(vector(robot.p_WP))
+        led = {"tip_outside": Outside(Point, rest, scenario.guided)}
     blocks = add_blocks(
         builder,
-        {
-            "arc_navigation": ArcNavigation(scenario.arcs, robot.p_WP, guess),
+        led
+        | {
+            "arc_navigation": navigation,
             "joint_commands": JointCommands(
                 scenario.joints,
                 bedside.posture.tolist(),
@@ -71,7 +86,7 @@ def make_wrist_diagram(
         builder,
         "passive_wrist",
         systems,
-        [*WIRES, *wrist_wires(scenario)],
+        [*WIRES, *wrist_wires(scenario), *([LED] if is_led else [])],
         EXPORTS | wrist_exports(scenario),
         scenario.faults,
     )

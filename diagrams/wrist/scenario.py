@@ -11,6 +11,7 @@ from plants.instruments.instrument import InstrumentParams
 from systems.common.parameter import parameter, part
 from systems.motion.joint_commands import JointCommandsParams
 from systems.passive_wrist.arc_navigation import ArcParams
+from systems.passive_wrist.hand_navigation import HandNavigationParams
 from systems.passive_wrist.wrist_law import MODES
 
 
@@ -27,6 +28,10 @@ class WristScenario(Scenario, WristSettings, TipSettings):
     compare: list[str] = parameter(
         [], "modes that are run as well and drawn beside it", choices=MODES, shape=(-1,)
     )
+    guided: str | None = parameter(
+        None, "tape `t,x,y,z` of where a hand led the tip; '': live", file=True
+    )
+    hand: HandNavigationParams = part(HandNavigationParams)
     robot: ToolAtStart = part(ToolAtStart)
     arcs: ArcParams = part(ArcParams)
     joints: JointCommandsParams = part(JointCommandsParams)

@@ -8,6 +8,7 @@ from diagrams.bedside.wrist_metrics import wrist_figures
 from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.study import Study, View
 from diagrams.wrist.diagram import make_wrist_diagram
+from diagrams.wrist.live import LIVE
 from diagrams.wrist.plots import plots
 from diagrams.wrist.scenario import WristScenario, companions
 from plants.abdomen.wall_force import FulcrumError
@@ -41,4 +42,5 @@ STUDY = Study(
     companions=companions,
     required=("system", "duration", "wrist", "robot.p_WG", "robot.p_WP"),
     view=View(camera=(0.3, -0.42, 0.14), target=(0.0, 0.0, 0.0)),
+    live=LIVE,
 )

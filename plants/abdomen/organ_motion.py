@@ -60,19 +60,55 @@ def _recorded(path: str, time: float) -> np.ndarray:
     return np.array([np.interp(at, times, axis - axis.mean()) for axis in points.T])
 
 
+class OrganCourse:
+    """Where a point of the organ is over time.
+
+    Attributes:
+        trajectory: Its place in m (3) over the time in s.
+    """
+
+    def __init__(
+        self,
+        params: OrganMotionParams,
+        wall: WallMotionParams,
+        p_W: Any,
+        duration: float,
+    ) -> None:
+        """Computes it, p_W its place at rest, in m (3).
+
+        Raises:
+            ValueError: If a parameter or the recording makes no sense.
+        """
+        self._params, self._p_W = check(params), np.asarray(p_W)
+        self._times = np.arange(0.0, duration + 1.0, _KNOT)
+        self._rows = np.zeros((len(self._times), 3))
+        self.change(wall, 0.0, duration + 1.0)
+
+    def change(self, wall: WallMotionParams, start: float, end: float) -> None:
+        """Computes it anew from a time to another, in s: the breath is another."""
+        first, last = np.searchsorted(self._times, [start, end])
+        times = self._times[first:last].tolist()
+        self._rows[first:last] = [self._params.displacement(t, wall) for t in times]
+        slopes: Any = np.gradient(self._rows, self._times, axis=0)
+        self.trajectory = PiecewisePolynomial.CubicHermite(
+            self._times, (self._p_W + self._rows).T, slopes.T
+        )
+
+
 def organ_trajectory(
     params: OrganMotionParams, wall: WallMotionParams, p_W: Any, duration: float
 ) -> PiecewisePolynomial:
-    """Where a point of the organ is over time, p_W its place at rest, in m (3).
+    """The trajectory of an `OrganCourse`."""
+    return OrganCourse(params, wall, p_W, duration).trajectory
 
-    Raises:
-        ValueError: If a parameter or the recording makes no sense.
-    """
-    check(params)
-    times = np.arange(0.0, duration + 1.0, _KNOT)
-    rows = np.array([params.displacement(t, wall) for t in times.tolist()])
-    slopes = np.gradient(rows, times, axis=0)
-    return PiecewisePolynomial.CubicHermite(times, (np.asarray(p_W) + rows).T, slopes.T)
+
+def with_axis(motion: PiecewisePolynomial, u: Any) -> StackedTrajectory:
+    """A trajectory of a point with an axis that stays, as a `Shaft` has them."""
+    ends = [motion.start_time(), motion.end_time()]
+    shaft = StackedTrajectory()
+    shaft.Append(motion.Clone())
+    shaft.Append(PiecewisePolynomial.ZeroOrderHold(ends, np.tile(u, (2, 1)).T))
+    return shaft
 
 
 def add_organ_motion(builder: Any, motion: PiecewisePolynomial, u: Any) -> Any:
@@ -88,10 +124,5 @@ def add_organ_motion(builder: Any, motion: PiecewisePolynomial, u: Any) -> Any:
         and `organ_shaft`, which emits point and axis as a `Shaft`, for a tracker.
     """
     source = builder.AddNamedSystem("organ_motion", TrajectorySource(motion, 1))
-    seen = motion.Clone()
-    ends = [motion.start_time(), motion.end_time()]
-    axis = PiecewisePolynomial.ZeroOrderHold(ends, np.tile(u, (2, 1)).T)
-    shaft = StackedTrajectory()
-    shaft.Append(seen)
-    shaft.Append(axis)
-    return source, builder.AddNamedSystem("organ_shaft", TrajectorySource(shaft))
+    shaft = TrajectorySource(with_axis(motion, u))
+    return source, builder.AddNamedSystem("organ_shaft", shaft)

@@ -14,7 +14,7 @@ import numpy as np
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from plants.abdomen.abdomen import Abdomen
+from plants.abdomen.abdomen import Abdomen, AbdomenParams
 from plants.abdomen.breath import Irregular
 from plants.abdomen.breathing_curve import load_curve
 from plants.common.actuation import hold_still
@@ -131,6 +131,52 @@ def wave(kind: str, breaths: float) -> float:
     return 2.0 * ((1.0 + out) * exp(-out) - left * out / rest) - 1.0
 
 
+class Course:
+    """Where the wall's servos are told to be, over a time.
+
+    Attributes:
+        trajectory: Places and, all zero, speeds over time.
+    """
+
+    def __init__(
+        self, motion: WallMotionParams, wall: AbdomenParams, duration: float
+    ) -> None:
+        """Computes it.
+
+        Args:
+            motion: The wall's motion.
+            wall: Its mass and stiffness.
+            duration: How long it is needed, in s.
+        """
+        times = np.arange(0.0, duration + 1.0, _KNOT)
+        if any(motion.step) and not motion.step_duration:
+            edge = motion.step_time
+            times = np.sort(np.append(times, [edge - 1e-3, edge]))
+            times = times[np.append(True, np.diff(times) > 1e-6)]
+        # A PD servo that is sent positions alone lags by kd / kp: sent ahead by it.
+        self._lead = 2.0 * sqrt(wall.wall_mass / wall.wall_stiffness)
+        self._times = times
+        self._samples, self._slopes = np.zeros((2, 6, len(times)))
+        self.change(motion, 0.0, duration + 1.0)
+
+    def change(self, motion: WallMotionParams, start: float, end: float) -> None:
+        """Computes it anew from a time to another, in s: the motion is another."""
+        first, last = np.searchsorted(self._times, [start, end])
+        small = 1e-4
+        for i in range(first, last):
+            time = float(self._times[i])
+            before, at, after = (
+                np.array(motion.displacement(time + d)) for d in (-small, 0.0, small)
+            )
+            v = (after - before) / (2.0 * small)
+            if np.linalg.norm(v) > 1.0:  # the step's edge
+                v = np.zeros(3)
+            self._samples[:3, i], self._slopes[:3, i] = at + self._lead * v, v
+        self.trajectory = PiecewisePolynomial.CubicHermite(
+            self._times, self._samples, self._slopes
+        )
+
+
 def add_wall_motion(
     builder: Any,
     plant: Any,
@@ -154,27 +200,8 @@ def add_wall_motion(
     if params.still:
         hold_still(builder, plant, abdomen.wall_instance)
         return
-    times = np.arange(0.0, duration + 1.0, _KNOT)
-    if any(params.step) and not params.step_duration:
-        edge = params.step_time
-        times = np.sort(np.append(times, [edge - 1e-3, edge]))
-        times = times[np.append(True, np.diff(times) > 1e-6)]
-    # A PD servo that is sent positions alone lags by kd / kp: sent ahead by it.
-    p = abdomen.params
-    lead = 2.0 * sqrt(p.wall_mass / p.wall_stiffness)
-    samples = np.zeros((6, len(times)))
-    slopes = np.zeros((6, len(times)))
-    small = 1e-4
-    for i, time in enumerate(times.tolist()):
-        before, at, after = (
-            np.array(params.displacement(time + d)) for d in (-small, 0.0, small)
-        )
-        v = (after - before) / (2.0 * small)
-        if np.linalg.norm(v) > 1.0:  # the step's edge
-            v = np.zeros(3)
-        samples[:3, i], slopes[:3, i] = at + lead * v, v
-    motion = PiecewisePolynomial.CubicHermite(times, samples, slopes)
-    source = builder.AddNamedSystem("wall_motion", TrajectorySource(motion))
+    course = Course(params, abdomen.params, duration)
+    source = builder.AddNamedSystem("wall_motion", TrajectorySource(course.trajectory))
     builder.Connect(
         source.get_output_port(),
         plant.get_desired_state_input_port(abdomen.wall_instance),

@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 
 from plants.crowd.orca import orca_towards
-from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle, filled
+from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle
 from plants.crowd.social_force import social_force_towards
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
+from systems.common.compiled import compiled
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import size
 
 MODELS = ("orca", "social_force")
+OBSTACLE_SIZE = size(Obstacle)
 PERIOD = 0.25
 """Of everyone's decisions [s]."""
 
@@ -75,6 +77,17 @@ def starts(params: CrowdParams) -> list[Obstacle]:
     ]
 
 
+@compiled
+def straight_on(people: np.ndarray, decided: np.ndarray, time: float) -> np.ndarray:
+    """Rows of `Obstacle`, `CAPACITY` of them, a time after people have decided."""
+    table, dt = np.zeros(CAPACITY * OBSTACLE_SIZE), time - decided[0]
+    table[: len(people)] = people
+    for k in range(0, len(people), OBSTACLE_SIZE):
+        table[k] += dt * people[k + 3]
+        table[k + 1] += dt * people[k + 4]
+    return table
+
+
 class CrowdMotion(Block):
     """Moves a crowd by ORCA or the social force.
 
@@ -108,24 +121,24 @@ class CrowdMotion(Block):
         self.signal_out(
             "obstacles",
             OBSTACLES,
-            lambda context: filled(self._now(context)),
+            self._now,
             {self.xd_ticket(), self.time_ticket()},
         )
         self.update_every(PERIOD, self._update)
 
-    def _now(self, context: Any) -> list[Obstacle]:
-        """Everyone at the context's time, straight on since the last decision."""
+    def _now(self, context: Any) -> np.ndarray:
+        """Everyone at the context's time, as the port has them."""
         state = context.get_discrete_state
-        dt = context.get_time() - state(self._decided).value().item()
-        table = state(self._people).value().reshape(-1, size(Obstacle))
-        return [
-            Obstacle(x + dt * v_x, y + dt * v_y, radius, v_x, v_y)
-            for x, y, radius, v_x, v_y in table.tolist()
-        ]
+        now: np.ndarray = straight_on(
+            state(self._people).value(),
+            state(self._decided).value(),
+            context.get_time(),
+        )
+        return now
 
     def _update(self, context: Any) -> Sequence[Any]:
-        people = self._now(context)
-        seen = []
+        rows = self._now(context).reshape(-1, size(Obstacle))[: len(self.goals)]
+        people, seen = [*map(Obstacle._make, rows.tolist())], []
         if self.params.sees_robot and self._robot.HasValue(context):
             robot = RobotState(*self._robot.Eval(context).tolist())
             c, s = cos(robot.theta), sin(robot.theta)
@@ -140,8 +153,5 @@ class CrowdMotion(Block):
             moves = social_force_towards(
                 [*people, *seen], self.goals, self.params.speed, PERIOD
             )
-        turned = [
-            person._replace(v_x=v_x, v_y=v_y)
-            for person, (v_x, v_y) in zip(people, moves, strict=True)
-        ]
-        return np.array([context.get_time()]), np.ravel(turned)
+        rows[:, 3:] = moves
+        return np.array([context.get_time()]), rows.ravel()

@@ -56,6 +56,10 @@ class ObstacleParams:
         [], "its waypoints x, y", "m", shape=(-1, 2), **FAR
     )
 
+    guided: str | None = parameter(
+        None, "tape `t,x,y` of where somebody drove it; '': live", file=True
+    )
+
     def rules(self) -> Rules:
         """Waypoints come one after the other; a bouncing one starts in its box."""
         if self.motion == "waypoints":

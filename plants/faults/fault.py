@@ -6,7 +6,7 @@ from systems.common.parameter import parameter
 
 KINDS = (
     *("force_stuck", "force_flipped", "force_bias", "force_silent"),
-    *("frame_future", "estimate_nan", "tension_nan", "arm_slow"),
+    *("frame_future", "frame_lost", "estimate_nan", "tension_nan", "arm_slow"),
     *("fulcrum_aside", "fulcrum_deep"),
 )
 """What can fail. Sizes: N along x in W of `force_bias` (of one sample: a spike), s that

@@ -37,6 +37,10 @@ def _in_future(now: np.ndarray, before: np.ndarray, size: float, period: float) 
     view(TrackedShaft, now).time[...] += size
 
 
+def _lost(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
+    view(TrackedShaft, now).valid[...] = 0.0
+
+
 def _nan(now: np.ndarray, before: np.ndarray, size: float, period: float) -> None:
     now[:] = np.nan
 
@@ -59,6 +63,7 @@ BREAKS: dict[str, Breaks] = {
     "force_bias": _biased,
     "force_silent": _silent,
     "frame_future": _in_future,
+    "frame_lost": _lost,
     "estimate_nan": _nan,
     "tension_nan": _nan,
     "arm_slow": _slow,
@@ -96,24 +101,38 @@ class FaultyWire(Block):
         else:
             self._whole = self.signal_in("whole", signal)
             self.signals["told"] = signal
-        # What was told at the last sample, and whether the fault is on.
-        self.DeclareDiscreteState(np.append(np.zeros(size), self._is_on(0.0)))
+        # What was told at the last sample, whether the fault is on, and its start.
+        start = self._fault.start
+        first = [*np.zeros(size), self._is_on(0.0, start), start]
+        self.DeclareDiscreteState(first)
         reads = {self._whole.ticket(), self.xd_ticket()}
         self.vector_out("told", size, self._calc_told, reads)
         self.update_every(period, self._update)
 
     def _calc_told(self, context: Any) -> np.ndarray:
         whole = self._whole.Eval(context).copy()
-        state = context.get_discrete_state_vector().value()
-        if state[-1]:
-            self._breaks(whole, state[:-1], self._fault.size, self._period)
+        *before, is_on, _ = context.get_discrete_state_vector().value()
+        if is_on:
+            self._breaks(whole, np.array(before), self._fault.size, self._period)
         return whole
 
-    def _is_on(self, time: float) -> float:
+    def strike(self, root: Any) -> float:
+        """Lets the fault begin at the next sample but one; returns when that is, in s.
+
+        A `Fault` that starts then is the same.
+        """
+        context = self.GetMyMutableContextFromRoot(root)
+        start = float(context.get_time() + self._period)
+        state = context.get_mutable_discrete_state_vector()
+        state.SetAtIndex(state.size() - 1, start)
+        return start
+
+    def _is_on(self, time: float, start: float) -> float:
         """1 if a sample at a time is told wrongly, else 0."""
-        since = time + 0.5 * self._period - self._fault.start
+        since = time + 0.5 * self._period - start
         return float(0.0 < since <= self._fault.duration)
 
     def _update(self, context: Any) -> np.ndarray:
-        is_on = self._is_on(context.get_time() + self._period)
-        return np.append(self._calc_told(context), is_on)
+        start = context.get_discrete_state_vector().value()[-1]
+        is_on = self._is_on(context.get_time() + self._period, start)
+        return np.array([*self._calc_told(context), is_on, start])

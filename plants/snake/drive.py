@@ -46,6 +46,13 @@ class SnakeDriveParams:
     wire_stiffness: float = parameter(
         2.0e4, "of one elastic wire", "N/m", least=1e3, most=1e6
     )
+    pretension: float = parameter(
+        0.0,
+        "T_0 to which a load cell's loop winds a looser wire; of statics alone",
+        "N",
+        least=0.0,
+        most=50.0,
+    )
     wire_damping: float = parameter(
         2.0, "of one elastic wire", "N s/m", above=0.0, most=1e3
     )

@@ -11,7 +11,7 @@ hold as they are, since they depend on the chord p = ||P P'|| across a ball alon
 With R_i exp(delta) and r = R_i^T P, P . R_i c has the gradient c x r and the Hessian
 sym(r c^T) - (r . c) I. The energy of wires, core, weight and tool force is
 
-    E = sum T^2 / 2k  or  sum T L,  T = max(0, pull + k (L - L_d)),  + ...
+    E = sum T^2 / 2k  or  sum T L,  T = max(T_0, pull + k (L - L_d)),  + ...
 
 Where it is least the snake stays; an eigenvalue of its Hessian that is not positive
 says that it does not, though it be in balance.
@@ -26,9 +26,23 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import TURNS, turned_by
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
+from plants.snake.friction import (
+    SnakeFrictionParams,
+    bound,
+    flat_grip,
+    grip_of,
+    remembered,
+)
 from plants.snake.parameters import MODULES, STOP, SnakeParams
 from plants.snake.posture import Array
-from plants.snake.statics_kernels import ROPES, Forces, assembled, empty_forces
+from plants.snake.statics_kernels import (
+    ROPES,
+    Forces,
+    Grip,
+    assembled,
+    empty_forces,
+    loose,
+)
 from plants.snake.weight import GRAVITY
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check
@@ -39,6 +53,10 @@ LONGEST = 0.3
 """Step of a ball in an iteration, in rad."""
 MOST = 60
 """Iterations."""
+AT_ONCE = 2
+"""Iterations in which what friction can hold stays as it is."""
+BOUNDED = 1e-5
+"""Change of what friction can hold at which a step is done, in N."""
 RIGID = 1e3
 """Torsion of coupled balls, in Nm/rad: as good as none."""
 RIM = 5.0
@@ -113,21 +131,27 @@ def _descent(g: Any, H: Any, U: Any, step: Any) -> bool:
 
 @compiled
 def settled(
-    start: Any, pull: Any, stiffness: float, wound: Any, load: Any, s: Any, most: int
-) -> tuple[Any, Forces, float, int, bool, bool]:
+    start: Any,
+    pull: Any,
+    stiffness: float,
+    wound: Any,
+    load: Any,
+    s: Any,
+    grip: Grip,
+    most: int,
+) -> tuple[Any, Forces, int, bool, bool]:
     """The equilibrium that is downhill from a start: Newton's method with a search.
 
     Returns:
-        Turns, forces there, the least eigenvalue, iterations, whether the torques
-        that are left are below `TOLERANCE`, and whether the way led over a Hessian
-        that is not positive.
+        Turns, forces there, iterations, whether the torques that are left are below
+        `TOLERANCE`, and whether the way led over a Hessian that is not positive.
     """
     n = 3 * MODULES if s.coupled else TURNS
     now, new = start.copy(), start.copy()
     here, there = empty_forces(), empty_forces()
     g, H, U, step = np.zeros(n), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     delta = np.zeros(TURNS)
-    energy = assembled(now, pull, stiffness, wound, load, s, here)
+    energy = assembled(now, pull, stiffness, wound, load, s, grip, here)
     has_moment = load[3] != 0.0 or load[4] != 0.0 or load[5] != 0.0
     done = left_it = False
     count = 0
@@ -147,7 +171,7 @@ def settled(
         for _ in range(25):
             _expanded(step * share, s, delta)
             turned_by(now, delta, new)
-            e = assembled(new, pull, stiffness, wound, load, s, there)
+            e = assembled(new, pull, stiffness, wound, load, s, grip, there)
             # Below rounding, and of a moment, the energy tells nothing; torques do.
             if has_moment or abs(e - energy) < 1e-13 * (1e-3 + abs(energy)):
                 _reduced(there, s, g, H)
@@ -162,11 +186,54 @@ def settled(
         now, new = new, now
         here, there = there, here
         energy = e
-    _reduced(here, s, g, H)
+    return now, here, count, done, left_it
+
+
+@compiled
+def slid(
+    start: Any,
+    pull: Any,
+    stiffness: float,
+    wound: Any,
+    load: Any,
+    s: Any,
+    grip: Grip,
+    most: int,
+) -> tuple[Any, Forces, float, int, bool, bool, float]:
+    """The equilibrium after a step in which wires and sockets may slide.
+
+    Args:
+        start: Turns from which it is looked for.
+        pull: As of `assembled`, and so on.
+        stiffness: Of a wire.
+        wound: L_d.
+        load: On the tool.
+        s: The snake.
+        grip: What friction holds on to, and will after the step.
+        most: Iterations.
+
+    Returns:
+        Turns, forces, the least eigenvalue of a further step's Hessian, iterations,
+        whether it is in balance, whether it left a state that it could not stay in,
+        and the heat in J.
+    """
+    now, total, lost = start, 0, False
+    while True:
+        now, to, count, done, left = settled(
+            now, pull, stiffness, wound, load, s, grip, min(AT_ONCE, most - total)
+        )
+        total, lost = total + count, lost or left
+        stuck = count == 0 and not done
+        if (bound(now, to, s, grip) < BOUNDED and done) or stuck or total >= most:
+            break
+    heat = remembered(now, to, s, grip)
+    n = 3 * MODULES if s.coupled else TURNS
+    g, H = np.empty(n), np.empty((n, n))
+    _reduced(to, s, g, H)
     least = math.nan
     if math.isfinite(np.abs(H).max()):
         least = np.linalg.eigvalsh(H)[0]
-    return now, here, least, count, done, left_it
+    return now, to, least, total, done, lost, heat
 
 
 class Equilibrium(NamedTuple):
@@ -181,6 +248,9 @@ class Equilibrium(NamedTuple):
         iterations: That it took.
         converged: Whether it is in balance.
         buckled: Whether the way there left a state that it could not stay in.
+        heat: What friction took on the way, in J.
+        P: Mean tension of each wire over each ball in N, (6, 9).
+        grip: What it holds on to from here.
     """
 
     turns: Array
@@ -190,6 +260,9 @@ class Equilibrium(NamedTuple):
     iterations: int
     converged: bool
     buckled: bool
+    heat: float
+    P: Array
+    grip: Grip
 
     @property
     def stable(self) -> bool:
@@ -210,11 +283,13 @@ class Statics:
         drive: SnakeDriveParams | None = None,
         core: SnakeCoreParams | None = None,
         gravity: ArrayLike = GRAVITY,
+        friction: SnakeFrictionParams | None = None,
     ) -> None:
         """Makes it; `gravity` in W in m/s2, (3,)."""
         self.params = p = check(params or SnakeParams())
         self.drive = v = check(drive or SnakeDriveParams())
         self.core = c = check(core or SnakeCoreParams())
+        self.friction = f = check(friction or SnakeFrictionParams())
         phi = np.ravel(p.azimuths())
         elastic = c.kind == "elastic"
         self.record = packed(
@@ -232,7 +307,11 @@ class Statics:
             ball=v.ball_mass,
             plate=v.plate_mass,
             ring=v.tool_mass,
+            pretension=v.pretension,
             g=np.asarray(gravity, float),
+            wire=f.wire,
+            socket=f.socket,
+            give=f.give,
         )
 
     def energy(
@@ -254,7 +333,20 @@ class Statics:
         """
         to = empty_forces()
         args = self._arguments(tension, wound, force, moment)
-        return assembled(turns, *args, self.record[0], to), to
+        return assembled(turns, *args, self.record[0], loose(turns), to), to
+
+    def at_rest(self, turns: Array) -> Grip:
+        """What friction holds on to where nothing has slid, and nothing pulls."""
+        to, grip = empty_forces(), loose(turns)
+        args = self._arguments((0.0,) * ROPES, None, (0.0,) * 3, (0.0,) * 3)
+        assembled(turns, *args, self.record[0], grip, to)
+        return grip._replace(slip=-to.slip)
+
+    def ahead(self, grip: Grip) -> Array:
+        """Where the balls will be if they turn as in the last step, (6, 3, 3)."""
+        turns = np.empty_like(grip.turns)
+        turned_by(grip.turns, grip.step, turns)
+        return turns
 
     def equilibrium(
         self,
@@ -263,13 +355,22 @@ class Statics:
         wound: ArrayLike | None = None,
         force: ArrayLike = (0.0, 0.0, 0.0),
         moment: ArrayLike = (0.0, 0.0, 0.0),
+        grip: Grip | None = None,
     ) -> Equilibrium:
-        """The equilibrium downhill from turns; arguments as of `energy`."""
+        """The equilibrium downhill from turns; arguments as of `energy`.
+
+        With friction it is the end of a step in which wires and force change steadily,
+        from where `grip` holds: that of the last step, or all at rest at `turns`.
+        It is looked for from `turns`, of which `ahead` makes a good guess.
+        """
         args = self._arguments(tension, wound, force, moment)
-        now, to, least, count, done, buckled = settled(
-            turns, *args, self.record[0], MOST
+        grip = grip_of(flat_grip(grip or self.at_rest(turns)))
+        now, to, least, count, done, buckled, heat = slid(
+            turns, *args, self.record[0], grip, MOST
         )
-        return Equilibrium(now, to.L, to.T, least, count, done, buckled)
+        return Equilibrium(
+            now, to.L, to.T, least, count, done, buckled, heat, to.P, grip
+        )
 
     def _arguments(
         self, tension: Any, wound: Any, force: Any, moment: Any

@@ -8,7 +8,7 @@ import numpy as np
 from plants.snake.balls import BALLS, TURNS, times
 from plants.snake.parameters import MODULES, WIRES
 from systems.common.compiled import compiled
-from systems.common.geometry import along, over, scaled
+from systems.common.geometry import Vector, along, norm, over, scaled
 
 ROPES = WIRES * MODULES
 
@@ -22,6 +22,9 @@ class Forces(NamedTuple):
         J: dL/d(delta), (9, 18).
         g: Gradient of the energy, (18,).
         H: Its Hessian, (18, 18).
+        P: Mean tension of each wire over each ball, (6, 9).
+        slip: How far each wire would give way there, if it did not slide, (6, 9).
+        strain: The same of the balls in their sockets, in rad, (6, 3).
     """
 
     L: Any
@@ -29,6 +32,30 @@ class Forces(NamedTuple):
     J: Any
     g: Any
     H: Any
+    P: Any
+    slip: Any
+    strain: Any
+
+
+class Grip(NamedTuple):
+    """What friction holds on to (`friction`), fixed while an equilibrium is sought.
+
+    Attributes:
+        turns: R_i from which sockets count, (6, 3, 3).
+        most: Largest change of a wire's tension over each ball in N, (6, 9).
+        slip: To be added to the path beyond each ball's middle, (6, 9) in m.
+        socket: Largest torque of each socket in Nm, (6,).
+        strain: By which sockets give way at `turns`, (6, 3) in rad.
+        step: By which the balls turned in the last step, (18,) in rad: the next may be
+            as large, and is looked for from there. Zero without friction.
+    """
+
+    turns: Any
+    most: Any
+    slip: Any
+    socket: Any
+    strain: Any
+    step: Any
 
 
 @compiled
@@ -40,7 +67,19 @@ def empty_forces() -> Forces:
         np.zeros((ROPES, TURNS)),
         np.zeros(TURNS),
         np.zeros((TURNS, TURNS)),
+        np.zeros((BALLS, ROPES)),
+        np.zeros((BALLS, ROPES)),
+        np.zeros((BALLS, 3)),
     )
+
+
+@compiled
+def loose(turns: Any) -> Grip:
+    """No friction at all."""
+    wires = np.zeros((BALLS, ROPES))
+    strain = np.zeros((BALLS, 3))
+    sockets, step = np.zeros(BALLS), np.zeros(TURNS)
+    return Grip(turns.copy(), wires, wires.copy(), sockets, strain, step)
 
 
 @compiled
@@ -145,8 +184,76 @@ def _loads(turns: Any, load: Any, s: Any, g: Any, H: Any) -> float:
 
 
 @compiled
+def sine_of(B: Any) -> Vector:
+    """Axis of a rotation matrix times the sine of its angle."""
+    x, y, z = B[2, 1] - B[1, 2], B[0, 2] - B[2, 0], B[1, 0] - B[0, 1]
+    return 0.5 * x, 0.5 * y, 0.5 * z
+
+
+@compiled
+def _held(w: int, T: float, paths: Any, s: Any, grip: Grip, to: Forces) -> float:
+    """Tensions of a wire over its balls, and the energy that its friction stores."""
+    count = 2 * (w // WIRES + 1)
+    energy = beyond = 0.0
+    for i in range(count - 1, -1, -1):
+        to.slip[i, w] = grip.slip[i, w] + beyond + 0.5 * paths[i, w]
+        beyond += paths[i, w]
+    for i in range(count):
+        most, slip = grip.most[i, w], to.slip[i, w]
+        size = min(abs(slip), s.give)
+        change = math.copysign(most * size / s.give, slip)
+        to.P[i, w] = T + 0.5 * change
+        T += change
+        energy += most * (abs(slip) - size + 0.5 * size * size / s.give)
+        if most > 0.0 and abs(slip) < s.give:
+            for a in range(3 * i, 3 * count):
+                ka = most / s.give * to.J[w, a] * (0.5 if a < 3 * i + 3 else 1.0)
+                for b in range(3 * i, 3 * count):
+                    share = 0.5 if b < 3 * i + 3 else 1.0
+                    to.H[a, b] += ka * share * to.J[w, b]
+    return energy
+
+
+@compiled
+def _socket(i: int, Q: Any, s: Any, grip: Grip, to: Forces, g: Any, H: Any) -> float:
+    """Energy that a ball's socket stores and takes; adds its derivatives."""
+    # B = R_i^T R_i' of the step so far: its sine's vector, whose gradient is G.
+    B, G = np.empty((3, 3)), np.empty((3, 3))
+    times(grip.turns[i].T, Q, B)
+    trace = B[0, 0] + B[1, 1] + B[2, 2]
+    sine = sine_of(B)
+    for a in range(3):
+        to.strain[i, a] = grip.strain[i, a] + sine[a]
+        for b in range(3):
+            G[a, b] = 0.5 * ((trace if a == b else 0.0) - B[b, a])
+    e = (to.strain[i, 0], to.strain[i, 1], to.strain[i, 2])
+    size, give = norm(e), s.give / s.R
+    stiff = grip.socket[i] / max(size, give)
+    for a in range(3):
+        for b in range(3):
+            g[a] += stiff * G[b, a] * e[b]
+            total = 0.0
+            for k in range(3):
+                for n in range(3):
+                    K = 1.0 if k == n else 0.0
+                    if size > give:
+                        K -= e[k] * e[n] / (size * size)
+                    total += G[k, a] * K * G[n, b]
+            H[a, b] += stiff * total
+    held = min(size, give)
+    return grip.socket[i] * (size - held + 0.5 * held * held / give)
+
+
+@compiled
 def assembled(
-    turns: Any, pull: Any, stiffness: float, wound: Any, load: Any, s: Any, to: Forces
+    turns: Any,
+    pull: Any,
+    stiffness: float,
+    wound: Any,
+    load: Any,
+    s: Any,
+    grip: Grip,
+    to: Forces,
 ) -> float:
     """Energy of the balls' turns (6, 3, 3), and its derivatives.
 
@@ -157,6 +264,7 @@ def assembled(
         wound: L_d in m, (9,).
         load: Force and moment on the tool in W, (6,).
         s: The snake, as `Statics` packs it.
+        grip: What friction holds on to.
         to: Where the derivatives go.
 
     Returns:
@@ -169,6 +277,7 @@ def assembled(
     R, d = s.R, s.d
     rho2 = R * R + d * d
     kept = np.empty((BALLS, ROPES, 7))
+    paths = np.empty((BALLS, ROPES))
     for i in range(BALLS):
         Q = turns[i]
         for w in range(WIRES * (i // 2), ROPES):
@@ -180,6 +289,7 @@ def assembled(
             p = math.sqrt(max(2 * (rho2 - rc), 1e-12))
             f, f1, f2 = path_over(p, s)
             to.L[w] += f
+            paths[i, w] = f
             to.J[w, 3 * i] = -f1 * (y * r2 - d * r1) / p
             to.J[w, 3 * i + 1] = -f1 * (d * r0 - x * r2) / p
             to.J[w, 3 * i + 2] = -f1 * (x * r1 - y * r0) / p
@@ -188,14 +298,21 @@ def assembled(
     energy = 0.0
     for w in range(ROPES):
         T = pull[w] + stiffness * (to.L[w] - wound[w])
-        if T < 0.0:  # slack; what is no number stays none
-            T = 0.0
+        least = s.pretension if stiffness > 0.0 else 0.0
+        taut = not least > T  # what is no number stays none
+        if stiffness > 0.0 and not taut:
+            energy += least * (T - 0.5 * least) / stiffness
+        T = T if taut else least
         to.T[w] = T
-        energy += T * T / (2 * stiffness) if stiffness > 0.0 else T * to.L[w]
+        if stiffness > 0.0:
+            energy += T * T / (2 * stiffness) if taut else 0.0
+        else:
+            energy += T * to.L[w]
         count = 6 * (w // WIRES + 1)
+        energy += _held(w, T, paths, s, grip, to)
         for a in range(count):
-            to.g[a] += T * to.J[w, a]
-        if T > 0.0 and stiffness > 0.0:
+            to.g[a] += to.P[a // 3, w] * to.J[w, a]
+        if taut and T > 0.0 and stiffness > 0.0:
             for a in range(count):
                 ka = stiffness * to.J[w, a]
                 for b in range(count):
@@ -203,7 +320,7 @@ def assembled(
     for i in range(BALLS):
         H = to.H[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
         for w in range(WIRES * (i // 2), ROPES):
-            k, T = kept[i, w], to.T[w]
+            k, T = kept[i, w], to.P[i, w]
             r, rc, p, f1, f2 = k[:3], k[3], k[4], k[5], k[6]
             c = (s.points[w, 0], s.points[w, 1], d)
             # f'' gp gp^T + f' hess p, with gp = J / f'
@@ -215,4 +332,6 @@ def assembled(
                     H[a, b] += Ja * to.J[w, 3 * i + b] - share * half
                 H[a, a] += share * rc
         energy += _core(turns[i], s, to.g[3 * i : 3 * i + 3], H)
+        if grip.socket[i] > 0.0:
+            energy += _socket(i, turns[i], s, grip, to, to.g[3 * i : 3 * i + 3], H)
     return energy + _loads(turns, load, s, to.g, to.H)

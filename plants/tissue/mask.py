@@ -1,5 +1,7 @@
 """A patient's mask: from a file to the tissue that it labels."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 import io
 import json
@@ -7,12 +9,13 @@ import os
 from pathlib import Path
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plants.tissue import mask_reader
-from plants.tissue.image import MaskError
+from plants.tissue.image import Image, MaskError
 from plants.tissue.labels import BRAIN, TUMOUR
 from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.mask_reader import Labelled
@@ -42,21 +45,48 @@ def load_mask(path: str | Path, labels: MaskLabels | None = None) -> Tissue:
     """
     wanted, file = labels or MaskLabels(), Path(path)
     check(wanted, "labels")
+    with _named("mask", file):
+        told, values = _read_apart(file, asdict(wanted))
+        part = Labelled(values, np.array(told.pop("X_PV")), **told)
+        return tissue_of(part, wanted.component, file.name)
+
+
+def load_image(path: str | Path) -> Image:
+    """Reads an image as greys, uint8, to be looked at: what `load_mask` reads too.
+
+    Args:
+        path: The file; its own affine is kept.
+
+    Raises:
+        ValueError: If the file is damaged or no image; it says what was expected.
+    """
+    file = Path(path)
+    with _named("image", file):
+        told, values = _read_apart(file, None)
+        return Image(values, np.array(told["X_PV"]))
+
+
+@contextmanager
+def _named(what: str, file: Path) -> Iterator[None]:
+    """What is wrong with a file is said with its name."""
     try:
         if not file.exists():
             raise MaskError("no such file")
         if not file.is_file():
             raise MaskError("it is no file")
-        return tissue_of(_read_apart(file, wanted), wanted.component, file.name)
+        yield
+        return
     except MaskError as error:
         why = str(error)
     except OSError as error:
         why = f"it cannot be read: {error.strerror}"
-    raise MaskError(f"mask {str(path)!r}: {why}")
+    raise MaskError(f"{what} {str(file)!r}: {why}")
 
 
-def _read_apart(file: Path, wanted: MaskLabels) -> Labelled:
-    """Reads a mask in a process of its own."""
+def _read_apart(
+    file: Path, wanted: dict[str, Any] | None
+) -> tuple[dict[str, Any], NDArray[np.uint8]]:
+    """Reads a mask, or an image if no labels are wanted, in a process of its own."""
     # It finds its modules where this one does, but for the folder it is started in:
     # nothing that lies beside a mask is imported.
     home = str(Path(__file__).parents[2])
@@ -68,7 +98,7 @@ def _read_apart(file: Path, wanted: MaskLabels) -> Labelled:
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-m", mask_reader.__name__, str(file)],
-            input=json.dumps(asdict(wanted)).encode(),
+            input=json.dumps(wanted).encode(),
             capture_output=True,
             env=environment,
             timeout=MOST_TIME,
@@ -84,8 +114,7 @@ def _read_apart(file: Path, wanted: MaskLabels) -> Labelled:
     told = json.loads(stream.readline())
     if "error" in told:
         raise MaskError(told["error"])
-    values = np.load(stream, allow_pickle=False)
-    return Labelled(values, np.array(told.pop("X_PV")), **told)
+    return told, np.load(stream, allow_pickle=False)
 
 
 def tissue_of(part: Labelled, component: int, name: str) -> Tissue:

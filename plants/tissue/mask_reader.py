@@ -3,9 +3,9 @@
 What a file asks for is refused before it is asked of the machine; this is the second
 wall. It imports little, to start in a fraction of a second.
 
-    python -m plants.tissue.mask_reader FILE < wanted labels, JSON
+    python -m plants.tissue.mask_reader FILE < wanted labels, JSON; null for an image
 
-It writes a line of JSON, and the labels as .npy if the file is a mask.
+It writes a line of JSON, and the labels or greys as .npy if the file has them.
 """
 
 from collections.abc import Callable
@@ -72,19 +72,7 @@ def read(path: Path, wanted: MaskLabels) -> Labelled:
     if is_dicom(path):
         image = read_dicom(path, wanted)
         return cropped(image.values, image)
-    ending = [end for end in READERS if path.name.lower().endswith(end)]
-    if not ending:
-        raise MaskError(
-            f"expected a label map whose name ends in {', '.join(READERS)}; export "
-            "other kinds but DICOM (SEG, RTSTRUCT) as one of these"
-        )
-    reader = READERS[ending[0]]
-    if reader is read_nifti:
-        image = read_nifti(path, wanted.transform)
-    elif wanted.transform == AUTO:
-        image = reader(path)
-    else:
-        raise MaskError(f"labels.transform={wanted.transform}: only NIfTI has two")
+    image = read_image(path, wanted.transform)
     return cropped(labels_of(image, wanted), image)
 
 
@@ -98,12 +86,66 @@ def cropped(labels: NDArray[np.uint8], image: Image) -> Labelled:
     return Labelled(labels[tuple(box)], image.X_PV, corner, labels.shape, image.notes)
 
 
+def read_image(path: Path, transform: str = AUTO) -> Image:
+    """Reads the file that is named, and no other but a header's data beside it.
+
+    Raises:
+        MaskError: If it is damaged or absurdly large.
+    """
+    ending = [end for end in READERS if path.name.lower().endswith(end)]
+    if not ending:
+        raise MaskError(
+            f"expected a label map whose name ends in {', '.join(READERS)}; export "
+            "other kinds but DICOM (SEG, RTSTRUCT) as one of these"
+        )
+    reader = READERS[ending[0]]
+    if reader is read_nifti:
+        return read_nifti(path, transform)
+    if transform == AUTO:
+        return reader(path)
+    raise MaskError(f"labels.transform={transform}: only NIfTI has two")
+
+
+def greys_of(values: NDArray) -> NDArray[np.uint8]:
+    """An image's values as greys, from its darkest percent to its brightest.
+
+    Raises:
+        MaskError: If none is finite.
+    """
+    some = values[tuple(slice(None, None, max(n // 128, 1)) for n in values.shape)]
+    some = some[np.isfinite(some)]
+    if some.size == 0:
+        raise MaskError("its values are not finite: expected an image")
+    low, high = np.percentile(some, (1, 99))
+    if low == high:  # a mask, most of it background
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    greys = np.empty(values.shape, np.uint8, order="F")
+    for k in range(values.shape[2]):  # no copy of a large image is made
+        share = (values[..., k] - low) / max(high - low, 1e-12)
+        greys[..., k] = np.rint(255 * np.clip(np.nan_to_num(share), 0.0, 1.0))
+    return greys
+
+
 def main() -> None:
     """The process: limits itself, reads, answers."""
     with suppress(ValueError, OSError):  # where there is no such limit
         resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     try:
-        part = read(Path(sys.argv[1]), MaskLabels(**json.load(sys.stdin)))
+        path, wanted = Path(sys.argv[1]), json.load(sys.stdin)
+        if wanted is None:
+            image = read_image(path)
+            values, told = greys_of(image.values), {"X_PV": image.X_PV.tolist()}
+        else:
+            part = read(path, MaskLabels(**wanted))
+            values, told = (
+                part.labels,
+                {
+                    "X_PV": part.X_PV.tolist(),
+                    "corner": part.corner,
+                    "sizes": part.sizes,
+                    "notes": part.notes,
+                },
+            )
     except MaskError as error:
         answer(error=str(error))
     except OSError as error:
@@ -111,13 +153,8 @@ def main() -> None:
     except MemoryError:
         answer(error=f"it takes more than {MOST_MEMORY / 2**30:.0f} GiB to read")
     else:
-        answer(
-            X_PV=part.X_PV.tolist(),
-            corner=part.corner,
-            sizes=part.sizes,
-            notes=part.notes,
-        )
-        np.save(sys.stdout.buffer, part.labels, allow_pickle=False)
+        answer(**told)
+        np.save(sys.stdout.buffer, values, allow_pickle=False)
 
 
 def answer(**told: Any) -> None:

@@ -115,13 +115,15 @@ def scan_of(
             lx = qx + side * (swing * hx - ASTRIDE * hy)
             ly = qy + side * (swing * hy + ASTRIDE * hx)
             _meet(ranges, robot.theta, lx, ly, params.leg)
+    angles = robot.theta + STEP * np.arange(RAYS)
+    cosines, sines = np.cos(angles), np.sin(angles)
     for i in range(len(params.walls)):
         ax, ay = params.walls[i, 0] - robot.x, params.walls[i, 1] - robot.y
         ex, ey = params.walls[i, 2] - robot.x - ax, params.walls[i, 3] - robot.y - ay
         if ex == 0.0 and ey == 0.0:
             continue
         for k in range(RAYS):
-            c, s = cos(robot.theta + k * STEP), sin(robot.theta + k * STEP)
+            c, s = cosines[k], sines[k]
             along = c * ey - s * ex
             if along != 0.0:
                 r, share = (ax * ey - ay * ex) / along, (ax * s - ay * c) / along

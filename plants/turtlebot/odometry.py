@@ -110,4 +110,5 @@ class Odometry(StepBlock):
             {"reckoned": RobotState},
             params.period,
             timed=False,
+            shared=False,
         )

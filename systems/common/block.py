@@ -61,6 +61,13 @@ class Block(LeafSystem):
         self._boxes.append([what])
         return self._boxes[-1]
 
+    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+        """Nothing: no block has a continuous state.
+
+        Drake asks every block of Python at every step of an integration, and where none
+        answers it throws and catches, which takes five times as long.
+        """
+
     def let_go(self) -> None:
         """Lets go of all that it refers to; it will not be asked again."""
         for box in self._boxes:

@@ -119,11 +119,13 @@ class StepBlock(Block):
         period: float,
         timed: bool = True,
         defaults: Mapping[str, Any] | None = None,
+        shared: bool = True,
     ) -> None:
         """Declares ports, state and update; outputs are those of the step.
 
         They are of the step from the last update to now: no sample of delay. Outputs
-        and update share it, so it is computed once an instant.
+        and update share it, so it is computed once an instant; not so if an integrator
+        asks for the output at all its stages, where to share costs more than to step.
 
         Args:
             step: Returns the next state and the outputs; see `wired`.
@@ -134,6 +136,7 @@ class StepBlock(Block):
             period: In s.
             timed: Whether the step depends on the time.
             defaults: Values of ports that need not be connected.
+            shared: Whether outputs and update share a step.
         """
         kind = _kind(state)
         gives = [kind, *outputs.values()]
@@ -141,10 +144,12 @@ class StepBlock(Block):
             step, constants, [kind], inputs, gives, timed, defaults or {}
         )
         self.DeclareDiscreteState(_array(state))
-        shared = self.cached("step", run, tickets | {self.xd_ticket()})
-        last = length(kind)
-        self._emit(shared, outputs, last)
-        self.update_every(period, lambda context: shared.Eval(context)[:last])
+        tickets, last = tickets | {self.xd_ticket()}, length(kind)
+        if shared:
+            once = self.cached("step", run, tickets)
+            run, tickets = once.Eval, {once.ticket()}
+        self._emit(run, tickets, outputs, last)
+        self.update_every(period, lambda context: run(context)[:last])
 
     def declare_update(
         self,
@@ -249,16 +254,21 @@ class StepBlock(Block):
         exec(source, names)
         return names["of_context"], tickets
 
-    def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
-        """Declares outputs that are the shared array's parts from `first` on."""
+    def _emit(
+        self,
+        run: Callable[[Any], np.ndarray],
+        tickets: set[Any],
+        outputs: Mapping[str, Any],
+        first: int,
+    ) -> None:
+        """Declares outputs that are an array's parts from `first` on."""
         for name, signal in outputs.items():
             last = first + length(signal)
 
             def part(context: Any, first: int = first, last: int = last) -> np.ndarray:
-                array: np.ndarray = shared.Eval(context)
-                return array[first:last]
+                return run(context)[first:last]
 
-            self.signal_out(name, signal, part, {shared.ticket()})
+            self.signal_out(name, signal, part, tickets)
             first = last
 
 

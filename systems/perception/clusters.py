@@ -7,7 +7,7 @@ out; two legs side by side are a person. The rays come in order, so that one pas
 them does what a general clustering would take a distance matrix for.
 """
 
-from math import asin, atan2, cos, hypot, sin
+from math import asin, atan2, cos, hypot, pi, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,6 +78,8 @@ def circle_of(
     x, y = place.x + d * cos(bearing), place.y + d * sin(bearing)
     for k in range(first, last + 1):
         r = scan[k % RAYS, 0]
+        if radius > params.largest:
+            break  # it is none that moves, and would only grow
         if r > 0.0:
             a = place.theta + k * STEP
             gap = hypot(place.x + r * cos(a) - x, place.y + r * sin(a) - y)
@@ -216,7 +218,9 @@ def seen_as(
         bearing = c.left - phi
     elif c.hidden == LEFT:
         bearing = c.right + phi
-    else:  # it is between them, and as far across as it was thought to be
-        bearing = atan2(y - place.y, x - place.x)
+    else:  # it is as far across as it was thought to be, and covers what is seen
+        low, wide = c.left - phi, max(c.right - c.left + 2.0 * phi, 0.0)
+        off = (atan2(y - place.y, x - place.x) - low + pi) % (2.0 * pi) - pi
+        bearing = low + min(max(off, 0.0), wide)
     x, y = place.x + d * cos(bearing), place.y + d * sin(bearing)
     return x, y, 0.5 * (params.noise + params.hidden_noise)

@@ -27,6 +27,8 @@ SETTLED = 4.0
 """Five hits: nothing new."""
 RELIABLE = 18.0
 """Twenty hits: so long has it stood that the robot finds its place by it."""
+AROUND = (0, *(i * CELLS + j for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j))
+"""From a cell to itself and its neighbours."""
 NEAR = 1.5
 """Within this distance [m] every point matters, beyond it one of four cells."""
 
@@ -43,8 +45,9 @@ def cell_of(params: Any, x: float, y: float) -> int:
 def walks(moving: np.ndarray, x: float, y: float, spare: float) -> bool:
     """Whether a place is on something that moves; rows of `Seen`."""
     for m in range(len(moving)):
-        gap = hypot(x - moving[m, 1], y - moving[m, 2]) - moving[m, 3]
-        if moving[m, 0] >= 0.0 and gap < spare:
+        reach = moving[m, 3] + spare
+        qx, qy = x - moving[m, 1], y - moving[m, 2]
+        if moving[m, 0] >= 0.0 and abs(qx) < reach and hypot(qx, qy) < reach:
             return True
     return False
 
@@ -68,6 +71,7 @@ def absorb(
         moving: Rows of `Seen`: what is left out.
     """
     new = grid.copy()
+    moving = moving[moving[:, 0] >= 0.0]
     hit = np.zeros(len(grid), np.bool_)
     passed = np.zeros(len(grid), np.bool_)
     for k in range(RAYS):
@@ -92,6 +96,9 @@ def absorb(
         if not hit[c]:
             new[c, 0] = min(max(new[c, 0], 0.0) + HIT, MOST)
         hit[c] = True
+    # In cells from here on: the loop's body is passed ten thousand times.
+    px = (place.x - params.left) / params.cell
+    py = (place.y - params.bottom) / params.cell
     for k in range(RAYS):
         r = scan[k, 0]
         # What nothing comes back from is far away, or a dropout, which is rare.
@@ -99,9 +106,12 @@ def absorb(
         ex, ey = cos(place.theta + k * STEP), sin(place.theta + k * STEP)
         # Two rays a cell at three metres: what a ray steps over its neighbours find.
         for step in range(int(far / (0.8 * params.cell))):
-            along = (step + 0.5) * 0.8 * params.cell
-            j = cell_of(params, place.x + along * ex, place.y + along * ey)
-            if j < 0 or hit[j] or passed[j]:
+            along = (step + 0.5) * 0.8
+            i, j = floor(px + along * ex), floor(py + along * ey)
+            if not (0 <= i < CELLS and 0 <= j < CELLS):
+                continue
+            j += i * CELLS
+            if hit[j] or passed[j]:
                 continue
             if new[j, 0] > 0.0:  # only if it passes through what stood there
                 qx, qy = new[j, 1] - place.x, new[j, 2] - place.y
@@ -114,18 +124,22 @@ def absorb(
 
 @compiled
 def stands(params: Any, grid: np.ndarray, x: float, y: float) -> float:
-    """The log of odds of what a point belongs to, 0 if it is new there."""
+    """The log of odds of what a point belongs to, 0 if it is new there.
+
+    From `RELIABLE` on, how much more does not matter.
+    """
     most = 0.0
     c = cell_of(params, x, y)
     if c < 0:
         return most
-    for i in range(-1, 2):
-        for j in range(-1, 2):
-            k = c + i * CELLS + j
-            if k < 0 or k >= len(grid) or grid[k, 0] < SETTLED:
-                continue
-            if hypot(grid[k, 1] - x, grid[k, 2] - y) < params.cell:
-                most = max(most, grid[k, 0])
+    for beside in AROUND:
+        k = c + beside
+        if k < 0 or k >= len(grid) or grid[k, 0] < max(SETTLED, most):
+            continue
+        if hypot(grid[k, 1] - x, grid[k, 2] - y) < params.cell:
+            most = grid[k, 0]
+            if most >= RELIABLE:
+                break
     return most
 
 

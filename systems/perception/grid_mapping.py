@@ -112,7 +112,10 @@ class GridMapping(Block):
         self._scan = self.signal_in("scan", SCAN)
         self._moving = self.signal_in("moving", MOVING)
         self._belief = self.DeclareDiscreteState([0.0] * size(Belief))
-        self._grid = self.state_out("grid", GRID, np.zeros(size(GRID)))
+        # Not `state_out`: that port takes ten thousand cells over one by one.
+        self._grid = self.DeclareDiscreteState(np.zeros(size(GRID)))
+        held = {self.discrete_state_ticket(self._grid)}
+        self.signal_out("grid", GRID, lambda c: self._state(c, self._grid), held)
         self.signal_out(
             "place",
             RobotState,

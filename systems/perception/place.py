@@ -143,6 +143,7 @@ def locate(
     xy += along * c * s
     told = inverse((xx + 1e-8, xy, yy + 1e-8, xt, yt, tt + 1e-8))
     x, y, theta = p.x, p.y, p.theta
+    moving = moving[moving[:, 0] >= 0.0]
     info = told
     for _ in range(ITERATIONS):
         ex, ey, et = x - p.x, y - p.y, theta - p.theta
@@ -157,12 +158,13 @@ def locate(
             c0 = cell_of(params, x + rx, y + ry)
             if c0 < 0 or walks(moving, x + rx, y + ry, 0.15):
                 continue
-            nearest, least = -1, GATE
+            nearest, least = -1, GATE * GATE
             for i in range(-1, 2):
                 for j in range(-1, 2):
                     o = c0 + i * CELLS + j
                     if 0 <= o < len(grid) and grid[o, 0] >= RELIABLE:
-                        gap = hypot(grid[o, 1] - x - rx, grid[o, 2] - y - ry)
+                        gx0, gy0 = grid[o, 1] - x - rx, grid[o, 2] - y - ry
+                        gap = gx0 * gx0 + gy0 * gy0
                         if gap < least:
                             nearest, least = o, gap
             if nearest < 0:

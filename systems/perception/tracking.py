@@ -224,18 +224,21 @@ def corners(
     count = 0
     for k in range(RAYS):
         r = rays[k, 0]
-        if r == 0.0 or r > p.vision or count == EDGES:
+        if r == 0.0 or r > p.vision:
             continue
-        x = robot.x + r * cos(robot.theta + k * STEP)
-        y = robot.y + r * sin(robot.theta + k * STEP)
         for side in (-1, 1):
             open_ = True
             for n in range(1, 4):  # a single ray may be a dropout
                 s = rays[(k + side * n) % RAYS, 0]
-                open_ = open_ and (s == 0.0 or s > r + p.hides)
-            if open_ and count < EDGES and stands(p, rows, x, y) > 0.0:
-                write_corner(found, count, Corner(1.0, x, y))
-                count += 1
+                if 0.0 < s <= r + p.hides:
+                    open_ = False
+                    break
+            if open_ and count < EDGES:
+                x = robot.x + r * cos(robot.theta + k * STEP)
+                y = robot.y + r * sin(robot.theta + k * STEP)
+                if stands(p, rows, x, y) > 0.0:
+                    write_corner(found, count, Corner(1.0, x, y))
+                    count += 1
     return found.ravel()
 
 

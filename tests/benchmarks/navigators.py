@@ -4,6 +4,7 @@ All get the same body and control law, and all may retreat backwards from an
 obstacle that comes within two seconds.
 """
 
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -19,6 +20,7 @@ from systems.switching.statechart_planner import (
 )
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import SwitchingParams, SwitchingState
+from tests.benchmarks.dynamic_window import dynamic_window
 from tests.benchmarks.navigation_loop import Command, Now, Planner, Step
 from tests.benchmarks.navigation_scenes import Scene
 
@@ -135,15 +137,21 @@ def orca(scene: Scene) -> Step:
 
 def hrvo(scene: Scene) -> Step:
     """HRVO as `navground` has it."""
+    return navground("HRVO", scene)
+
+
+def navground(kind: str, scene: Scene) -> Step:
+    """A behaviour of the package `navground`, by its name there."""
     from navground import core
 
     robot = scene.robot
-    behavior = core.Behavior.make_type("HRVO")
+    behavior = core.Behavior.make_type(kind)
     behavior.kinematics = core.kinematics.OmnidirectionalKinematics(robot.speed)
     behavior.radius = robot.radius
     behavior.safety_margin = MARGIN
     behavior.optimal_speed = robot.speed
-    behavior.horizon = 5.0
+    if hasattr(behavior, "horizon"):
+        behavior.horizon = 5.0
     behavior.target = core.Target.Point(scene.goal, 0.5 * robot.reach)
 
     def step(now: Now) -> Command:
@@ -190,9 +198,11 @@ def planners() -> dict[str, Planner]:
         "switching, noisy": noisy(),
         "our statechart": statechart,
         "Khatib's sum": classical,
+        "DWA (ours)": partial(dynamic_window, MARGIN),
     }
     if find_spec("pyrvo"):
         found["ORCA (pyrvo)"] = orca
     if find_spec("navground"):
         found["HRVO (navground)"] = hrvo
+        found["social force (navground)"] = partial(navground, "SocialForce")
     return found

@@ -29,6 +29,7 @@ from diagrams.studies import load_scenario
 from plants.snake.actuation import angles_of_lengths, wire_lengths
 from plants.snake.balls import turns_of
 from plants.snake.drive import SnakeDriveParams
+from plants.snake.friction import SnakeFrictionParams
 from plants.snake.inverse_kinematics import positioning, tool_postures
 from plants.snake.kinematics import forward
 from plants.snake.parameters import SnakeParams
@@ -105,11 +106,17 @@ def kinematics(seed: int) -> list[tuple[str, float, float, str]]:
             "poses/s",
         ),
         ("equilibria, warm", 200 / best(equilibria()), 5e3, "postures/s"),
+        (
+            "the same with friction",
+            200 / best(equilibria(SnakeFrictionParams(0.1, 0.1))),
+            2e3,
+            "steps/s",
+        ),
         ("positioning IK, one pose", best(scalar) / 200 * 1e6, 150.0, "us"),
     ]
 
 
-def equilibria() -> Callable[[], None]:
+def equilibria(friction: SnakeFrictionParams | None = None) -> Callable[[], None]:
     """What finds 200 equilibria on a circle, each from the last."""
     bends = np.zeros((200, 7))
     bends[:, 1] = bends[:, 5] = np.linspace(0.0, 2 * np.pi, 200)
@@ -117,14 +124,17 @@ def equilibria() -> Callable[[], None]:
     bends[:, 2::2] = 0.3, 0.25, 0.2
     x = posture_of(bends)
     wound = wire_lengths(x, PARAMS) - 2e-4
-    snake = Statics(PARAMS, DRIVE)
+    snake = Statics(PARAMS, DRIVE, friction=friction)
 
     def sweep() -> None:
-        turns = turns_of(x[0])
+        turns, grip = turns_of(x[0]), None
         for lengths in wound:
-            found = snake.equilibrium(turns, wound=lengths, force=(0.1, 0.0, 0.0))
+            start = turns if grip is None else snake.ahead(grip)
+            found = snake.equilibrium(
+                start, wound=lengths, force=(0.1, 0.0, 0.0), grip=grip
+            )
             assert found.converged
-            turns = found.turns
+            turns, grip = found.turns, found.grip
 
     return sweep
 

@@ -1,13 +1,19 @@
 """The robot passes worlds that it only sees, and what no one can avoid is known."""
 
+from functools import partial
+from math import hypot
+
 import pytest
 
+from systems.switching.unicycle_control import heading_law
 from tests.benchmarks.built_scenes import KINDS, built
-from tests.benchmarks.navigation_loop import run
+from tests.benchmarks.dynamic_window import _wanted, dynamic_window
+from tests.benchmarks.navigation_loop import control_law, run
 from tests.benchmarks.navigation_scenes import Scene, in_hall, steady, three_moving
 from tests.benchmarks.navigators import switching
 from tests.benchmarks.sensed import Senses
-from tests.benchmarks.sensed_suite import avoidable, tables
+from tests.benchmarks.sensed_step import report
+from tests.benchmarks.sensed_suite import avoidable, recorded, tables
 
 
 @pytest.mark.parametrize("scene", built(3, 4), ids=list(KINDS))
@@ -39,3 +45,28 @@ def test_what_can_be_avoided():
 def test_report():
     (table,) = tables(1, 1, ["streams"], ["switching"])
     assert "streams: 1 of 1" in table and "switching" in table
+
+
+def test_filmed_people_are_met_clear_of_the_start():
+    (scene,) = recorded(1, 1)
+    gaps = [hypot(x - scene.start[0], y - scene.start[1])
+            for x, y, *_ in scene.frames(0)]  # fmt: skip
+    assert min(gaps) > 1.2 and len(scene.frames(300)) == len(gaps) > 3
+
+
+def test_the_dynamic_window_passes_what_stands_and_what_crosses():
+    discs = [(3.0, 0.1, 0.3, 0.0, 0.0), (6.0, -5.0, 0.3, 0.0, 0.4)]
+    scene = Scene("two", (0.0, 0.0), (8.0, 0.0), steady(discs, 0.05))
+    result = run(scene, partial(dynamic_window, 0.1))
+    assert result.outcome == "reached" and result.clearance > 0.05
+    # The common control law answers its velocity by the arc that was chosen.
+    law = control_law(scene.robot)
+    for rate in (-1.8, -0.4, 0.0, 1.2):
+        command = heading_law(law, 0.3, *_wanted(scene.robot, 0.3, 0.4, rate), False)
+        assert command.turn_rate == pytest.approx(rate, abs=0.01)
+        assert command.speed == pytest.approx(0.4)
+
+
+def test_what_a_scan_costs_is_told_by_part():
+    text = report(1, 20)
+    assert "place and grid" in text and "all" in text

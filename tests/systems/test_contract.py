@@ -13,8 +13,10 @@ import pytest
 
 from diagrams.studies import STUDIES, build, load_scenario
 import plants
+from plants.crowd.guided_disc import GuidedDisc
 from plants.surgeon.guided_tool import GuidedTool
 from plants.surgeon.led_tool import LedTool
+from plants.surgeon.tracked_tool import TrackedTool
 import systems
 from systems.common.block import Block
 from systems.common.step_block import StepBlock
@@ -35,8 +37,8 @@ def all_blocks(package) -> list[type]:
     return sorted(found, key=lambda kind: kind.__name__)
 
 
-ALONE = [GuidedTool]
-"""Of the plants' floor, but needing none; in a diagram while somebody guides it."""
+ALONE = [GuidedDisc, GuidedTool, TrackedTool]
+"""Of the plants' floor, but needing none; in a diagram while somebody guides them."""
 BLOCKS = [*all_blocks(systems), *ALONE]
 DIAGRAMS: dict[str, list[str]] = {
     "gauze_static": [],

@@ -1,7 +1,10 @@
 """Where an elementary volume is feasible now: a map over the surface of free space."""
 
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,29 +63,35 @@ def border(session: Session) -> NDArray[np.int64]:
     return np.flatnonzero(solid & ndimage.binary_dilation(free))
 
 
-def feasibility_map(
+def feasibility_map(session: Session, *args: Any, **kwargs: Any) -> FeasibilityMap:
+    """The whole of a `growing_map`, which takes the same arguments."""
+    return deque(growing_map(session, *args, **kwargs), maxlen=1).pop()
+
+
+def growing_map(
     session: Session,
     count: int = 1000,
     bend: float = 0.35,
     pitch: float = 3.0e-3,
     seed: int = 1,
-) -> FeasibilityMap:
+) -> Iterator[FeasibilityMap]:
     """Tries an elementary volume at points all over the border of free space.
 
     The volumes are clipped, as the planner's; each starts from the nearest postures
     that were reached, turned towards the point.
 
     Args:
-        session: How things stand; nothing changes.
+        session: How things stand; nothing changes. Between two points it may be asked
+            of other procedures; once one is committed, the map is of the past.
         count: Points.
         bend: Of the volume's widest ring, in rad.
         pitch: Between rings and along them, in m.
         seed: Of the choice of points.
+
+    Yields:
+        The map as far as it is made, at first of no point.
     """
-    volume, body, tree = session.volume, session.body, session.tree
-    volume.forget_journals()
-    session.make_room()
-    tree = session.tree
+    volume, body = session.volume, session.body
     rng = np.random.default_rng(seed)
     voxels = border(session)
     if len(voxels) > count:
@@ -90,11 +99,14 @@ def feasibility_map(
     points = volume.origin + volume.spacing * np.column_stack(
         np.unravel_index(voxels, volume.labels.shape)
     )
-    s, why = volume.space(), session.why
     found, far = np.empty(NODES, np.int64), np.empty(NODES)
     gained, reasons = np.zeros(len(points)), []
     x = np.empty(7)
+    yield FeasibilityMap(points[:0], gained[:0], [])
     for n, p in enumerate(points):
+        volume.forget_journals()
+        session.make_room()
+        s, tree, why = volume.space(), session.tree, session.why
         nearest_nodes(tree, p, found, far)
         reason = LIMIT
         for node, turn in product(found[found >= 0], TURNS):
@@ -110,7 +122,7 @@ def feasibility_map(
                 break
             reason = _reason(session, int(why[0]))
         reasons.append(reason)
-    return FeasibilityMap(points, gained, reasons)
+        yield FeasibilityMap(points[: n + 1], gained[: n + 1], list(reasons))
 
 
 def _reason(session: Session, part: int) -> str:

@@ -92,6 +92,24 @@ class Step:
 
 
 @dataclass
+class Preview:
+    """A procedure as it would go.
+
+    Attributes:
+        answer: Whether it is feasible now.
+        tips: Where its tool goes if nothing is in the way, in W in m, (n, 3).
+        freed: Flat indices of the tumour's voxels that it frees; if it is refused,
+            before that.
+        posture: The robot where it ends, or comes to a stand, (7,).
+    """
+
+    answer: Answer
+    tips: NDArray[np.float64]
+    freed: NDArray[np.int32]
+    posture: NDArray[np.float64]
+
+
+@dataclass
 class Session:
     """A resection under way.
 
@@ -147,11 +165,15 @@ class Session:
 
     def check(self, procedure: Procedure) -> Answer:
         """Whether a procedure is feasible now; nothing changes."""
-        answer = self._do(procedure)
-        self._take_back(self._mark)
-        return answer
+        return self.preview(procedure).answer
 
-    preview = check
+    def preview(self, procedure: Procedure) -> Preview:
+        """How a procedure would go now, to be drawn; nothing changes."""
+        answer, s = self._do(procedure), self.volume.space()
+        tree, freed = self.tree, s.freed[: s.used[0]].copy()
+        posture = tree.x[tree.route[tree.size[1] - 1]].copy()
+        self._take_back(self._mark)
+        return Preview(answer, self._tips, freed, posture)
 
     def commit(self, procedure: Procedure) -> Answer:
         """Makes a procedure part of the plan if it is feasible."""
@@ -215,10 +237,14 @@ class Session:
         )
 
     def _do(self, procedure: Procedure) -> Answer:
-        """Carries a procedure out in thought; `_mark` is how it was before."""
+        """Carries a procedure out in thought.
+
+        `_mark` is how it was before, `_tips` where its tool goes.
+        """
         self.volume.forget_journals()
         self.make_room()
         self._mark = (0, 0, int(self.tree.size[0]), int(self.tree.size[1]))
+        self._tips = np.empty((0, 3))
         check_procedure(procedure, self.params)
         params = with_tool(self.params, procedure.tool)
         body = self.body
@@ -237,7 +263,7 @@ class Session:
         n, s = R_WE @ own.axis(), self.volume.space()
         x = np.empty(7)
         O2 = R_WE @ start + o - (params.straight_module + params.tool_offset) * n
-        tips = tips_of(own, start, params) @ R_WE.T + o
+        tips = self._tips = tips_of(own, start, params) @ R_WE.T + o
         start = R_WE @ start + o
         status = posture_at(body, O2, n, x)
         if status == OK:

@@ -1,4 +1,4 @@
-"""Tip reference: where the tool is to be, poses one after another or a circle."""
+"""Tip reference: where the tool is to be: poses in turn, a circle, a scan, a swing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from plants.snake.parameters import SnakeParams
+from plants.snake.posture import posture_of
 from plants.snake.signals import ToolPose, ToolTarget
+from plants.snake.tool_target import target_of
 from systems.common.block import Block
 from systems.common.geometry import across, along, cross, plus, scaled, unit
 from systems.common.parameter import Rules, check, parameter, part
@@ -68,28 +71,74 @@ class CircleParams:
         yield is_direction(self.n_WT), "n_WT", "a direction"
 
 
+BEND: dict[str, Any] = {"least": -math.pi / 4, "most": math.pi / 4}
+
+
+@dataclass
+class ScanParams:
+    """Rings of the last module, ever wider, while the others stand bent."""
+
+    first: float = parameter(0.35, "bend of module 1's balls", "rad", **BEND)
+    second: float = parameter(0.26, "of module 2's", "rad", **BEND)
+    least: float = parameter(0.14, "of the last's, in the first ring", "rad", **BEND)
+    most: float = parameter(0.66, "in the last ring", "rad", **BEND)
+    rings: int = parameter(5, "their number", least=2, most=100)
+
+
+@dataclass
+class SwingParams:
+    """All modules bend in one plane, to one side and the other."""
+
+    bends: list[float] = parameter(
+        [0.7, 0.7, 0.7],
+        "of the modules' balls at either end",
+        "rad",
+        **BEND,
+        shape=(3,),
+    )
+    azimuth: float = parameter(
+        0.0, "of the plane", "rad", least=-2 * math.pi, most=2 * math.pi
+    )
+
+
+WAYS = ("circle", "scan", "swing")
+
+
 @dataclass
 class TipReferenceParams:
     """Parameters of `TipReference`."""
 
+    way: str = parameter(
+        "circle",
+        "circle; or scan or swing, in the circle's period and ramp",
+        choices=WAYS,
+    )
+
     poses: list[PoseParams] = parameter(
-        [], "poses, in turn and again; none for the circle", shape=(-1,)
+        [], "poses, in turn and again; none for the way", shape=(-1,)
     )
     dwell: float = parameter(
         2.0, "time from one pose to the next", "s", least=0.1, most=1e3
     )
     circle: CircleParams = part(CircleParams)
+    scan: ScanParams = part(ScanParams)
+    swing: SwingParams = part(SwingParams)
     lead: float = parameter(
         0.02, "how far ahead of time `target` is", "s", least=0.0, most=1.0
     )
 
 
-def circle_target(circle: CircleParams, time: float) -> ToolTarget:
-    """The pose on the circle at a time in s, at rest before 0."""
+def turned(circle: CircleParams, time: float) -> float:
+    """How far a circle has turned at a time in s, in rad; it is at rest before 0."""
     time = max(time, 0.0)
     ramp = circle.ramp
     turns = time * time / (2 * ramp) if time < ramp else time - ramp / 2
-    angle = 2 * math.pi * turns / circle.period
+    return 2 * math.pi * turns / circle.period
+
+
+def circle_target(circle: CircleParams, time: float) -> ToolTarget:
+    """The pose on the circle at a time in s."""
+    angle = turned(circle, time)
     n = unit(vector(circle.n_WT))
     # Two axes across n: the world's x as far as it goes, or y.
     u = unit(across((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n))
@@ -98,10 +147,32 @@ def circle_target(circle: CircleParams, time: float) -> ToolTarget:
     return ToolTarget(along(vector(circle.p_WC), circle.radius, r), n, leaning)
 
 
-def reference(params: TipReferenceParams, time: float) -> ToolTarget:
-    """The pose at a time in s."""
-    if not params.poses:
+def bends_at(params: TipReferenceParams, time: float) -> list[float]:
+    """The bends of a scan or a swing, as the paper writes them, (7,)."""
+    angle = turned(params.circle, time)
+    if params.way == "swing":
+        swing = params.swing
+        sine = math.sin(angle)
+        return [0.0] + [
+            value for bend in swing.bends for value in (swing.azimuth, sine * bend)
+        ]
+    scan = params.scan
+    # The first ring is bent to, in its first half turn; then it widens ring by ring.
+    share = min(angle / (2 * math.pi) / (scan.rings - 1), 1.0)
+    bend = scan.least + share * (scan.most - scan.least)
+    bend *= 0.5 - 0.5 * math.cos(min(angle, math.pi))
+    return [0.0, 0.0, scan.first, 0.0, scan.second, angle, bend]
+
+
+def reference(
+    params: TipReferenceParams, time: float, snake: SnakeParams | None = None
+) -> ToolTarget:
+    """The pose at a time in s; a scan's and a swing's is that of a snake."""
+    if not params.poses and params.way == "circle":
         return circle_target(params.circle, time)
+    if not params.poses:
+        p, x = snake or SnakeParams(), posture_of(bends_at(params, time))
+        return target_of(x, p.half_pitch, p.tool_offset)
     # An instant that rounding puts just before a change belongs after it.
     index = int(max(time, 0.0) / params.dwell + 1e-9)
     return params.poses[index % len(params.poses)].target()
@@ -115,17 +186,23 @@ class TipReference(Block):
     Port ``reference`` emits the `ToolPose` of this instant.
     """
 
-    def __init__(self, params: TipReferenceParams | None = None) -> None:
-        """Makes the block."""
+    def __init__(
+        self,
+        params: TipReferenceParams | None = None,
+        snake: SnakeParams | None = None,
+    ) -> None:
+        """Makes the block, for a snake whose scan or swing it may be."""
         super().__init__()
         self._params = check(params or TipReferenceParams())
+        self._snake = check(snake or SnakeParams())
         ticket = {self.time_ticket()}
         self.signal_out("target", ToolTarget, self._calc_target, ticket)
         self.signal_out("reference", ToolPose, self._calc_reference, ticket)
 
     def _calc_target(self, context: Any) -> np.ndarray:
-        return flat(reference(self._params, context.get_time() + self._params.lead))
+        time = context.get_time() + self._params.lead
+        return flat(reference(self._params, time, self._snake))
 
     def _calc_reference(self, context: Any) -> np.ndarray:
-        target = reference(self._params, context.get_time())
+        target = reference(self._params, context.get_time(), self._snake)
         return flat(ToolPose(target.p, target.n))

@@ -1,13 +1,17 @@
-"""Tool load: a force on the tool that grows with time."""
+"""Tool load: a force on the tool that grows with time, and what cutting resists."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from plants.snake.signals import ToolForce
+from plants.snake.signals import ToolForce, ToolPose
 from systems.common.block import Block
 from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import view
+
+SLOW = 1e-3
+"""Speed in m/s below which cutting resists the less, the slower the tool is."""
 
 
 @dataclass
@@ -24,15 +28,30 @@ class ToolLoadParams:
     )
     start: float = parameter(0.0, "when it begins to grow", "s", least=0.0, most=1e4)
     end: float = parameter(1.0, "when it has grown", "s", least=0.0, most=1e4)
+    cutting: float = parameter(
+        0.0, "that opposes the tool's motion besides", "N", least=0.0, most=3.0
+    )
+    period: float = parameter(
+        0.02, "over which its motion is taken", "s", least=1e-3, most=0.1
+    )
 
     def rules(self) -> Rules:
         """It takes time to grow."""
         yield self.start < self.end, "end", f"> start={self.start:g} s"
 
 
-class ToolLoad(Block):
-    """A force on the tool, constant in W, that grows steadily.
+def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
+    """A force in N against a way (3,) in m that took some time in s."""
+    speed = np.linalg.norm(moved) / time
+    against: np.ndarray = -force / max(speed, SLOW) * moved / time
+    return against
 
+
+class ToolLoad(Block):
+    """A force on the tool, constant in W, that grows steadily, and one against motion.
+
+    Port ``tool`` accepts the `ToolPose`, of which the last period's motion counts; it
+    need not be connected.
     Port ``force`` emits the `ToolForce`.
     """
 
@@ -40,9 +59,23 @@ class ToolLoad(Block):
         """Makes the block."""
         super().__init__()
         self._params = check(params or ToolLoadParams())
-        self.signal_out("force", ToolForce, self._calc_force, {self.time_ticket()})
+        self._tool = self.signal_in("tool", ToolPose)
+        # Where the tool was at the last update, and what opposed its motion.
+        self.DeclareDiscreteState(np.append([np.nan] * 3, [0.0] * 3))
+        tickets = {self.time_ticket(), self.xd_ticket()}
+        self.signal_out("force", ToolForce, self._calc_force, tickets)
+        self.update_every(self._params.period, self._calc_next)
+
+    def _calc_next(self, context: Any) -> np.ndarray:
+        last = context.get_discrete_state(0).value()
+        if not self._tool.HasValue(context):
+            return np.array(last)
+        p = np.array(view(ToolPose, self._tool.Eval(context)).p)
+        against = opposing(self._params.cutting, p - last[:3], self._params.period)
+        return np.append(p, np.where(np.isfinite(against), against, 0.0))
 
     def _calc_force(self, context: Any) -> np.ndarray:
         p = self._params
         share = (context.get_time() - p.start) / (p.end - p.start)
-        return np.clip(share, 0.0, 1.0) * np.array(p.force)
+        grown: np.ndarray = np.clip(share, 0.0, 1.0) * np.array(p.force)
+        return grown + context.get_discrete_state(0).value()[3:]

@@ -12,7 +12,7 @@ from plants.snake.core import SnakeCoreParams, torques_against_core
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import REST, Drums, Posture
-from plants.snake.tension import tensions
+from plants.snake.tension import tensions, torques_against
 from plants.snake.weight import GRAVITY, torques_of_weight, weight, whole_mass
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
@@ -69,11 +69,12 @@ def winding(
     snake: SnakeParams,
     drive: SnakeDriveParams,
     core: SnakeCoreParams = PAPERS,
-) -> Callable[[np.ndarray], np.ndarray]:
+) -> Callable[..., np.ndarray]:
     """The map of a posture x (7) to drums (10): wires 0 to 8 and the translation [m].
 
     They hold the snake's weight as well, and bend its core: what gives way under it,
-    wires or servos, is wound shorter by as much.
+    wires or servos, is wound shorter by as much. Wires that stretch hold a force on the
+    tool, too, the map's second argument (3,).
     """
     if params.stiffness == 0.0:
         c = packed(
@@ -88,9 +89,11 @@ def winding(
         )
         return lambda x: _wound(c, x)
 
-    def stretched(x: np.ndarray) -> np.ndarray:
+    def stretched(x: np.ndarray, force: np.ndarray | None = None) -> np.ndarray:
         load = weight(x, snake, drive, params.gravity)
         tau = torques_against_core(x[1:], core) - load[1:]
+        if force is not None and force.any():
+            tau += torques_against(x, force, snake)
         T = tensions(x[1:], tau, snake, params.least_tension)
         s = x[0] - load[0] / drive.travel_kp
         return np.append(wire_lengths(x, snake) - T / params.stiffness, s)

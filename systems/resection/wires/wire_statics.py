@@ -5,9 +5,10 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.balls import BALLS, angles_of, turns_of
+from plants.snake.balls import angles_of, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
+from plants.snake.friction import SnakeFrictionParams, flat_grip, grip_of
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import (
     REST,
@@ -37,8 +38,8 @@ class WireStatics(Block):
     """Angles of six balls from wire lengths and the force on the tool.
 
     The snake is light and its motion slow: it is where its energy is least, downhill
-    from where it was. Set-points are taken ahead, as in `WireForwardActuation`. What
-    is no number leaves them where they were.
+    from where it was, as far as friction lets it. Set-points are taken ahead, as in
+    `WireForwardActuation`. What is no number leaves them where they were.
 
     Port ``lengths`` accepts the `Drums`.
     Port ``rates`` accepts their `DrumRates`.
@@ -55,6 +56,7 @@ class WireStatics(Block):
         core: SnakeCoreParams | None = None,
         period: float = 0.02,
         posture: ArrayLike = REST,
+        friction: SnakeFrictionParams | None = None,
     ) -> None:
         """Makes the block for a snake, its drive and core.
 
@@ -64,17 +66,18 @@ class WireStatics(Block):
             core: What stands between the balls.
             period: Of the drums in s, and the integrator's step.
             posture: From which the first equilibrium is downhill, (7).
+            friction: Of wires and sockets, which are at rest at first.
         """
         super().__init__()
-        self._statics = Statics(snake, drive, core)
+        self._statics = Statics(snake, drive, core, friction=friction)
         lag = self._statics.drive
         self._lead, self._travel_lead = lag.lead + period, lag.travel_lead + period
         self._lengths = self.signal_in("lengths", Drums)
         self._rates = self.signal_in("rates", DrumRates)
         self._force = self.signal_in("force", ToolForce)
-        # R_i and s at the last update.
-        start = np.append(turns_of(posture), np.asarray(posture, float)[0])
-        self.DeclareDiscreteState(start)
+        # What friction holds on to, R_i among it, and s at the last update.
+        start = flat_grip(self._statics.at_rest(turns_of(posture)))
+        self.DeclareDiscreteState(np.append(start, np.asarray(posture, float)[0]))
         ports = {port.ticket() for port in (self._lengths, self._rates, self._force)}
         self._found = self.cached("found", self._calc_found, ports | {self.xd_ticket()})
         found = {self._found.ticket()}
@@ -89,15 +92,18 @@ class WireStatics(Block):
         """The equilibrium a lead later, downhill from that of the last update."""
         drums = view(Drums, self._lengths.Eval(context))
         rates = view(DrumRates, self._rates.Eval(context))
-        last = np.array(context.get_discrete_state(0).value())[:-1]
-        last = last.reshape(BALLS, 3, 3)
+        last = grip_of(context.get_discrete_state(0).value()[:-1])
         wound = drums.wires + self._lead * rates.wires
         if not np.isfinite(wound).all():  # infinitely long is not slack
             wound = np.full_like(wound, np.nan)
         force = self._force.Eval(context)
-        found = self._statics.equilibrium(last, wound=wound, force=force)
+        found = self._statics.equilibrium(
+            self._statics.ahead(last), wound=wound, force=force, grip=last
+        )
         # Out of balance it falls downhill, as far as the search goes.
-        return found if np.isfinite(found.turns).all() else found._replace(turns=last)
+        if np.isfinite(flat_grip(found.grip)).all():
+            return found
+        return found._replace(turns=last.turns, grip=last)
 
     def _calc_s(self, context: Any) -> float:
         drums = view(Drums, self._lengths.Eval(context))
@@ -106,7 +112,8 @@ class WireStatics(Block):
         return s if np.isfinite(s) else float(context.get_discrete_state(0).value()[-1])
 
     def _calc_next(self, context: Any) -> np.ndarray:
-        return np.append(self._found.Eval(context).turns, self._calc_s(context))
+        grip = flat_grip(self._found.Eval(context).grip)
+        return np.append(grip, self._calc_s(context))
 
     def _calc_desired(self, context: Any) -> np.ndarray:
         angles = angles_of(self._found.Eval(context).turns)

@@ -13,6 +13,7 @@ from diagrams.campaigns.distributions import distribution
 from diagrams.campaigns.tape import Tape
 from diagrams.common.scenario import ScenarioError
 from diagrams.studies import scenario_of
+from plants.crowd.crowd_motion import starts
 
 
 def test_number_depends_on_seed_run_and_key_alone():
@@ -122,3 +123,16 @@ def test_every_run_of_a_crowd_has_a_world_of_its_own():
         job["overrides"]["crowd.seed"] for job in jobs if job["variant"] == "exact"
     ]
     assert len(set(seeds)) == len(seeds) == 20
+
+
+def test_a_crowd_has_room_and_the_robot_time():
+    campaign = load_campaign("crowd", runs=40)
+    base, sizes = base_of(campaign), set()
+    for run in range(40):
+        job = campaign.job(base, run, "", Tape([campaign.seed, run]))
+        made = scenario_of(deepcopy(base), job["overrides"], job["seed"])
+        assert len(starts(made.crowd)) == made.crowd.people
+        way = made.goal[1] - made.start[1]
+        assert way / made.robot.speed < made.duration
+        sizes.add(made.crowd.people)
+    assert min(sizes) == 5 and max(sizes) == 40

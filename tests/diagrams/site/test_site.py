@@ -17,8 +17,19 @@ def test_links_to_folders_lead_to_their_pages():
         "[a](../wrist/README.md) [b](inside.md#x) [c](replay.jpg) "
         "[d](../../overview.md)"
     )
-    far = "[e](https://drake.mit.edu) [f](study.py)"
-    assert build.relinked(far, page, taken) == "[e](https://drake.mit.edu) [f](#)"
+    far = "[e](https://drake.mit.edu) [f](study.py) [g](no.md)"
+    assert build.relinked(far, page, taken) == (
+        "[e](https://drake.mit.edu) [f](#) [g](no.md)"
+    )
+
+
+def test_names_of_files_lead_to_their_docstrings():
+    page, rooms = Path("diagrams/live/README.md"), [Path("diagrams/live")]
+    told = "| `session.py: Hand` | `test_session.py: test` |\n```\n`session.py`\n```\n"
+    there = "../../reference/diagrams.live.md#diagrams.live.session"
+    assert build.referred(told, page, rooms) == told.replace(
+        "`session.py: Hand`", f"[`session.py: Hand`]({there})"
+    )
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import SimpleITK as sitk
 from plants.tissue import mask, mask_reader
 from plants.tissue.image import MaskError
 from plants.tissue.labels import CRITICAL, TUMOUR
-from plants.tissue.mask import load_mask
+from plants.tissue.mask import load_image, load_mask
 from plants.tissue.mask_labels import MaskLabels
 from systems.common.parameter import ParameterError
 from tests.plants.tissue.mask_files import (
@@ -340,3 +340,28 @@ def test_a_file_that_may_not_be_read(tmp_path, monkeypatch):
     monkeypatch.setattr(mask, "_read_apart", denied)
     with pytest.raises(MaskError, match="cannot be read: Permission denied"):
         load_mask(path)
+
+
+@pytest.mark.parametrize("name", ["I.nii.gz", "I.nrrd"])
+def test_an_image_lies_where_the_mask_of_its_grid_does(tmp_path, name):
+    """Greys from black to white, whatever the scale; what is no number is black."""
+    labels = ellipsoid()
+    values = (1000.0 * labels + np.arange(labels.shape[0])[:, None, None]).astype("f4")
+    values[:3, :3, :3] = np.nan
+    grid = {"spacing": (1.0, 1.0, 2.0), "direction": TURN, "origin": (3.0, -5.0, 90.0)}
+    image = load_image(write_mask(tmp_path / name, values, **grid))
+    tissue = load_mask(write_mask(tmp_path / f"M{name}", labels, **grid))
+    np.testing.assert_allclose(image.X_PV, tissue.grid.X_PI, atol=1e-7)
+    assert image.values.shape == labels.shape and image.values.dtype == np.uint8
+    assert image.values[:3, :3, :3].max() == 0 and image.values[-1, 0, 0] < 20
+    middle = tuple(n // 2 for n in labels.shape)
+    assert image.values[middle] > 240
+
+
+def test_what_is_no_image_is_refused(tmp_path):
+    path = write_mask(tmp_path / "I.nrrd", np.zeros((4, 4, 4), np.uint8))
+    path.write_bytes(path.read_bytes()[:-3])
+    with pytest.raises(ValueError, match=r"image .*I.nrrd.*damaged"):
+        load_image(path)
+    with pytest.raises(ValueError, match=r"image .*none.*no such file"):
+        load_image(tmp_path / "none.nrrd")

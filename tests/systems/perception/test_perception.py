@@ -1,6 +1,6 @@
 """What is seen of a world by lidar: circles, tracks, a grid, and the own place."""
 
-from math import cos, hypot, sin
+from math import asin, cos, hypot, sin
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from plants.turtlebot.lidar import constants as lidar_constants
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.signal import size, view
 from systems.perception import grid_mapping, tracking, tracks
+from systems.perception.clusters import BETWEEN, Cluster, seen_as
 from systems.perception.grid import OCCUPIED
 from systems.perception.grid_mapping import GridMappingParams
 from systems.perception.place import Belief
@@ -159,6 +160,17 @@ def test_the_cheapest_matches_in_all_are_taken():
     table[0, 0], table[0, 1], table[2, 0] = 1.0, 2.0, 3.5
     np.testing.assert_array_equal(matched(table), [1, -1, 0, -1])
     assert (matched(table[:, :0]) == -1).all()
+
+
+def test_who_is_hidden_on_both_sides_covers_what_is_seen_of_them():
+    params = TrackingParams()
+    near, ends = 2.0, (-0.05, 0.05)
+    slit = Cluster(2.1, 0.0, 0.1, BETWEEN, 0.0, near, *ends, 0.0)
+    phi = asin(0.3 / 2.3)
+    for bearing, told in ((0.02, 0.02), (1.5, -0.05 + phi), (-1.5, 0.05 - phi)):
+        x, y = 2.3 * cos(bearing), 2.3 * sin(bearing)
+        at = seen_as.py_func(params, CENTRE, slit, x, y, 0.3)
+        assert at[:2] == pytest.approx((2.3 * cos(told), 2.3 * sin(told)))
 
 
 def test_broken_input_changes_nothing():
