@@ -228,7 +228,7 @@ class YieldingTissue:
         m.take(d, (carving.volume.tau != SOLID) & ~gone, labels)
         return moves
 
-    def _carving(self, labels: NDArray, gone: NDArray, critical: Array) -> Carving:
+    def _carving(self, labels: NDArray, gone: NDArray, critical: NDArray) -> Carving:
         volume = replace(
             self.material.volume.thought(),
             labels=labels,
