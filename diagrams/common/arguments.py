@@ -185,6 +185,17 @@ def make_parser() -> argparse.ArgumentParser:
         "--to", metavar="FOLDER", type=Path, required=True, help="is made if missing"
     )
     add_import(commands)
+    rehearse = commands.add_parser(
+        "rehearse",
+        parents=[named, changed, seeded],
+        help="rehearse a resection on tissue that yields, with scans of the cavity",
+        description="Plans and carries out a resection in rounds, on tissue that moves "
+        "as the tumour goes; between them the cavity is scanned and the plan mended, "
+        "e.g. --set shift.most=0.002. Writes rehearsal.json and rehearsal.png.",
+    )
+    rehearse.add_argument(
+        "--out", metavar="DIR", type=Path, help="default: out/rehearsal"
+    )
     spread = argparse.ArgumentParser(add_help=False)
     spread.add_argument(
         "--workers", type=int, metavar="N", help="processes; default: one a core"

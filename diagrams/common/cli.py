@@ -241,6 +241,13 @@ def atlas_command(arguments: argparse.Namespace) -> int:
     return atlas.atlas_command(arguments)
 
 
+def rehearse_command(arguments: argparse.Namespace) -> int:
+    """Runs `trocar rehearse`."""
+    from diagrams.resection import rehearsal
+
+    return rehearsal.rehearse_command(arguments)
+
+
 def import_command(arguments: argparse.Namespace) -> int:
     """Runs `trocar import`."""
     from diagrams.common.importing import import_file
@@ -263,6 +270,7 @@ COMMANDS = {
     "export": export_command,
     "campaign": campaign_command,
     "atlas": atlas_command,
+    "rehearse": rehearse_command,
     "import": import_command,
 }
 

@@ -10,6 +10,7 @@ from plants.tissue.mask_labels import MaskLabels
 from plants.tissue.tissue import SyntheticTumour
 from plants.tissue.tissue_carver import TissueCarverParams
 from plants.tissue.volume import Access
+from plants.tissue.yielding import CavityScanParams, TissueShiftParams
 from systems.common.parameter import Rules, parameter, part
 from systems.resection.planning.next_entry import EntriesParams
 from systems.resection.planning.planner import PlannerParams
@@ -20,6 +21,32 @@ from systems.resection.wires.wire_drums import WireDrumsParams
 from systems.resection.wires.wire_inverse_actuation import WireInverseActuationParams
 from systems.resection.wires.wire_tension import WireTensionParams
 from systems.resection.wires.wire_watch import WireWatchParams
+
+
+@dataclass
+class RehearsalParams:
+    """A resection on tissue that yields, in rounds between scans."""
+
+    reserve: float = parameter(
+        0.5e-3,
+        "kept to what is critical for what moves from one scan to the next",
+        "m",
+        above=0.0,
+        most=5e-3,
+    )
+    feared: float = parameter(
+        3.0e-3,
+        "displacement that is reckoned with when all of the tumour is gone",
+        "m",
+        above=0.0,
+        most=0.02,
+    )
+    most: float = parameter(
+        2.0,
+        "times the reserve that a scan may show before the robot stops",
+        least=1.0,
+        most=10.0,
+    )
 
 
 @dataclass
@@ -97,6 +124,9 @@ class ResectionScenario(Scenario):
     tension: WireTensionParams = part(WireTensionParams)
     watch: WireWatchParams = part(WireWatchParams)
     carver: TissueCarverParams = part(TissueCarverParams)
+    shift: TissueShiftParams = part(TissueShiftParams)
+    scan: CavityScanParams = part(CavityScanParams)
+    rehearsal: RehearsalParams = part(RehearsalParams)
 
     def rules(self) -> Rules:
         """Procedures are the robot's, and files are there."""

@@ -138,13 +138,22 @@ class Volume:
             allowed &= self.to_critical > self.margin
         return allowed.astype(np.uint8)
 
-    def retarget(self, body: Tissue, seen: NDArray[np.bool_] | None = None) -> None:
+    def retarget(
+        self,
+        body: Tissue,
+        seen: NDArray[np.bool_] | None = None,
+        opened: NDArray[np.bool_] | None = None,
+        time: int = 0,
+    ) -> None:
         """Takes over what is there now; what is gone stays gone, and counts as it did.
 
         Args:
             body: The tissue of an image taken meanwhile, of what is left.
             seen: Voxels that a scan of the cavity found to be tissue, (nx, ny, nz):
                 they are there though they were thought to be gone.
+            opened: Voxels that tissue left, (nx, ny, nz): they are free though
+                nothing was cut there, and count as tumour that is gone.
+            time: Arrival time of these.
 
         Raises:
             ValueError: If the tumour that is left lies beyond the grid.
@@ -165,6 +174,9 @@ class Volume:
         )
         if seen is not None:
             self.tau[seen & (self.tau > 0)] = SOLID
+        if opened is not None:
+            opened = opened & (self.tau == SOLID)
+            self.tau[opened], self.labels[opened] = time, TUMOUR
         kept = np.isin(self.labels, (CHANNEL, CAP)) | (
             (self.labels == TUMOUR) & (self.tau != SOLID)
         )

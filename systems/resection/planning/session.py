@@ -391,7 +391,12 @@ class Session:
         tree.size[:] = node + 1, visit + 1, node
         enlist_all(tree)
 
-    def update(self, tissue: Tissue, seen: NDArray[np.bool_] | None = None) -> Step:
+    def update(
+        self,
+        tissue: Tissue,
+        seen: NDArray[np.bool_] | None = None,
+        opened: NDArray[np.bool_] | None = None,
+    ) -> Step:
         """Takes the tissue as an image, and a scan of the cavity, show it now.
 
         The robot goes home, and relies on no way that it drove before: what it
@@ -401,13 +406,14 @@ class Session:
             tissue: Of an image taken meanwhile: the tumour that is left, and what is
                 critical, in the same frame P.
             seen: Voxels found to be tissue, as `Volume.retarget` takes them.
+            opened: Voxels found to be free, likewise.
 
         Raises:
             ValueError: If the tumour that is left lies beyond the grid.
         """
         if self.steps and self.steps[-1].kind != "home":
             self.go_home()
-        self.volume.retarget(tissue, seen)
+        self.volume.retarget(tissue, seen, opened, int(self.tree.size[1]) - 1)
         before = self.standing()
         self._begin_at_home()
         return self.record("update", UPDATE, before)
