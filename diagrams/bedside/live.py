@@ -21,7 +21,7 @@ def force_on_wall(session: Any) -> float:
     return float(np.linalg.norm(session.read("wall.force", Force).f))
 
 
-WALL = Figure("wall force [N]", force_on_wall, 0.0, 10.0, 0.01, 1.0)
+WALL = Figure("wall force [N]", force_on_wall, 0.0, 50.0, 0.01, 1.0)
 
 
 def wrist_switches(scenario: Any) -> list[Switch]:

@@ -13,6 +13,7 @@ examples:
   trocar run gauze_dynamic                  results in out/gauze_dynamic
   trocar run 'pwe_*' nav_crowd              several, one after the other
   trocar live gauze_dynamic                 take part, in the browser
+  trocar live gauze_static --tracker igtl://localhost:18944   tools by PLUS or Slicer
   trocar replay out/gauze_dynamic           opens the replay in the browser
   trocar compare out/gauze_static out/printed
   trocar run gauze_static --set go_to_target.form=printed --out out/printed

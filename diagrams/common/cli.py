@@ -76,7 +76,7 @@ def run_one(arguments: argparse.Namespace, name: str, out: Path) -> int:
     if arguments.tracker or arguments.stream:
         from diagrams.live.command import beside
 
-        run = beside(arguments, scenario, out, not arguments.no_replay)
+        run = beside(arguments, scenario, out)
     else:
         told = (not arguments.no_replay, progress_bar, arguments.endoscope)
         run = run_scenario(scenario, out, *told)

@@ -100,6 +100,7 @@ class Live:
         figures: What is shown of a scenario.
         words: Why the robot stands, or what it does.
         moving: A point of the robot whose speed is shown [m].
+        fastest: The greatest speed that is shown [m/s].
         tracked: What of a scenario a tracker may see: as guided by another program.
         streamed: What other programs are told: by name a point and a direction
             (None for none), or a text.
@@ -113,6 +114,7 @@ class Live:
     figures: Callable[[Any], list[Figure]] = lambda scenario: []
     words: Callable[[Any], str] = lambda session: ""
     moving: Callable[[Any], Any] | None = None
+    fastest: float = 0.2
     tracked: Callable[[Any], list[Guided]] = lambda scenario: []
     streamed: Callable[[Any], dict[str, Any]] = lambda session: {}
     frame: float = 1.0 / 60.0

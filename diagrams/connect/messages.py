@@ -14,10 +14,10 @@ from pydrake.math import RotationMatrix
 from pyigtl.messages import CRC64, MessageBase, StringMessage, TransformMessage
 
 HEADER = MessageBase.IGTL_HEADER_SIZE
-LARGEST = 1 << 31
+LARGEST = 1 << 28
 """Of a body that is believed, in bytes: an image may come by."""
 LARGEST_KEPT = 1 << 16
-"""Of a body that is looked into."""
+"""Of one that is looked into; a size that was damaged must not make us deaf."""
 OK = 1
 """Code of a STATUS that says that all is well."""
 _STATUS = struct.Struct(">Hq20s")
@@ -108,7 +108,9 @@ class Unpacker:
                 return found
             fields = _header(bytes(self._bytes[:HEADER]))
             size, kind = fields["body_size"], fields["message_type"]
-            if kind not in KINDS or size > LARGEST_KEPT:
+            if kind in KINDS and size > LARGEST_KEPT:
+                raise Garbage(f"a {kind} of {size} bytes")
+            if kind not in KINDS:
                 self._passed_over = HEADER + size
                 continue
             if len(self._bytes) < HEADER + size:

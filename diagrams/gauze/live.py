@@ -107,7 +107,7 @@ def clearance(session: Any) -> float:
     return float(session.values("clearance").min())
 
 
-CLEARANCE = Figure("clearance [mm]", clearance, -5.0, 100.0)
+CLEARANCE = Figure("clearance [mm]", clearance, -5.0, 300.0)
 
 
 def streamed(session: Any) -> dict[str, Any]:

@@ -68,16 +68,22 @@ def live_command(arguments: argparse.Namespace) -> Run:
         return played(session, arguments.speed, arguments.out or Path("out") / "live")
 
 
-def beside(
-    arguments: argparse.Namespace, scenario: Any, out: Path, with_replay: bool = True
-) -> Run:
+def beside(arguments: argparse.Namespace, scenario: Any, out: Path) -> Run:
     """Runs a scenario in real time, without a page: another program takes part."""
+    told = (not arguments.no_replay, progress_bar, arguments.endoscope)
     with links(arguments, scenario) as found:
-        return played(Session(scenario, None, **found), 1.0, out, with_replay)
+        return played(Session(scenario, None, **found), 1.0, out, *told)
 
 
-def played(session: Session, speed: float, out: Path, with_replay: bool = True) -> Run:
-    """Plays a session to its end, then runs what was done for its results."""
+def played(session: Session, speed: float, out: Path, *told: Any) -> Run:
+    """Plays a session to its end, then runs what was done for its results.
+
+    Args:
+        session: Not begun.
+        speed: Simulated seconds a second.
+        out: Folder of the results.
+        *told: What else `run_scenario` takes.
+    """
     with suppress(KeyboardInterrupt):
         session.play(session.scenario.duration, speed)
-    return run_scenario(session.save(out), out, with_replay, progress_bar)
+    return run_scenario(session.save(out), out, *(told or (True, progress_bar)))

@@ -36,10 +36,6 @@ USUAL = ("pause", "reset", "another seed", "end and save")
 """Buttons of every session, about those of the system."""
 
 
-SPEED = Figure("speed [mm/s]", lambda session: session.speed, 0.0, 150.0, 1.0)
-"""Of every robot that moves."""
-
-
 def spans(starts: list[float], lasting: float) -> list[tuple[float, float]]:
     """From when to when something is on that lasts so long after each of its starts."""
     found: list[tuple[float, float]] = []
@@ -102,11 +98,12 @@ class Session:
         self._guided = [one for one in live.tracked(played) if one.name in seen]
         if self._page:
             self._guided += [o for o in live.guided(played) if o.name not in seen]
-        played = live.held(played, [one.name for one in self._guided])
+        if self._guided:
+            played = live.held(played, [one.name for one in self._guided])
         for one in self._guided:
             setattr(one.owner(played), one.field, "")
         self._first_switch = len(played.faults)
-        self._switches = live.switches(played)
+        self._switches = live.switches(played) if self._page else []
         played.faults = played.faults + [
             Fault(s.kind, NEVER, s.lasting, s.size) for s in self._switches
         ]
@@ -133,10 +130,13 @@ class Session:
         self._simulator.Initialize()
         self.time, self._count, self.speed = 0.0, 0, 0.0
         self._struck: list[list[float]] = [[] for _ in self._switches]
-        self._acts = live.acts(played)
+        self._acts = live.acts(played) if self._page else {}
         self._figures = live.figures(played)
         if live.moving:
-            self._figures.append(SPEED)
+            most = 1e3 * live.fastest
+            self._figures.append(
+                Figure("speed [mm/s]", lambda session: session.speed, 0.0, most, 1.0)
+            )
             self._point = np.array(live.moving(self))
         self._said: dict[str, list[tuple[float, np.ndarray]]] = {}
         for one in self._guided:

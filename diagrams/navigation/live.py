@@ -84,6 +84,7 @@ LIVE = Live(
         Figure("to the goal [m]", to_goal, 0.0, 20.0, 0.01, 1.0),
     ],
     words=words,
+    fastest=2.0,
     moving=lambda session: [state(session).x, state(session).y, 0.0],
     streamed=streamed,
     frame=0.05,  # the planner's clock: other instants would cost steps

@@ -55,8 +55,8 @@ MOST_SENT = 10_000
 SPELL = 0.05
 """Of work on the map between two looks at what the page wants, in s."""
 
-REDRAWN = 0.7
-"""Between two drawings of a map that grows, in s."""
+REDRAWN = 250
+"""Points between two drawings of a map that grows."""
 
 
 class Stopped(Exception):
@@ -94,10 +94,10 @@ class Desk:
         self._answer, self._is_open = "", True
         self._found: FeasibilityMap | None = None
         self._growing: Iterator[FeasibilityMap] | None = None
-        self._drawn = 0.0
         self.show: dict[str, Any] = {
             "version": 0,
             "set": 0,
+            "pictures": 0,
             "meshcat": meshcat.port(),
             "name": file.name,
             "bounds": bounds(volume, self.console.session.params),
@@ -160,9 +160,7 @@ class Desk:
                 self.form = self.form.at(p_W)
                 self._set()
             self._propose()
-        elif self._growing is not None:
-            self._grow(monotonic() + SPELL)
-        else:
+        elif self._growing is None or not self._grow(monotonic() + SPELL):
             return
         self._publish()
 
@@ -243,26 +241,28 @@ class Desk:
 
     # What pages show ---------------------------------------------------------
 
-    def _grow(self, until: float) -> None:
-        """Goes on with the map for a while."""
+    def _grow(self, until: float) -> bool:
+        """Goes on with the map for a while, and says whether it was drawn."""
+        is_due = False
         while self._growing is not None and monotonic() < until:
             found = None if self.is_stopped else next(self._growing, None)
             if found is not None:
-                self._found = found
-                self.show["busy"] = f"map: {len(found.points)} points"
+                self._found, count = found, len(found.points)
+                self.show["busy"] = f"map: {count} points"
+                is_due = is_due or count % REDRAWN == 0
                 continue
             self._growing, self.show["busy"] = None, ""
             if self._found is not None and not self.is_stopped:
                 self.console.map, self._answer = self._found, told_map(self._found)
                 self._tell("map", self._answer)
-        if self._growing is None or monotonic() > self._drawn + REDRAWN:
+        if is_due or self._growing is None:
             self._draw_tumour()
+        return is_due or self._growing is None
 
     def _draw_tumour(self) -> None:
         session, reach = self.console.session, self.console.reach
         reachable = None if reach is None else reach.mask
         draw_tumour(self.meshcat, session, self._found, reachable, self._is_open)
-        self._drawn = monotonic()
 
     def _draw_all(self) -> None:
         self._draw_tumour()
@@ -288,13 +288,15 @@ class Desk:
                 p = np.array(where)
                 marks[name]["where"] = self.slices.pixel_of(name, p)
                 marks[name]["near"] = self.slices.depth_of(name, p, p_W) < NEAR
-        self.show["marks"] = marks
+        self.show |= {"marks": marks, "pictures": self.show["pictures"] + 1}
 
     def _publish(self) -> None:
         """Lets the pages know how things stand."""
         console, preview = self.console, self.console.preview
         session = console.session
-        is_good = None if preview is None else preview.answer.feasible
+        is_good = None  # what is said may be of something else
+        if preview is not None and preview.answer.text in self._answer:
+            is_good = preview.answer.feasible
         with self.news:
             self.show |= {
                 "version": self.show["version"] + 1,

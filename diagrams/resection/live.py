@@ -25,7 +25,7 @@ LIVE = Live(
     switches=lambda scenario: [Switch("tension not read", "tension_nan", 0.1)],
     figures=lambda scenario: [
         CUT,
-        Figure("body in tissue [checks]", hits, 0.0, 1000.0, 1.0, 1.0),
+        Figure("body hits", hits, 0.0, 1000.0, 1.0, 1.0),
     ],
     words=words,
     moving=lambda session: session.read("snake.tool", ToolPose).p,

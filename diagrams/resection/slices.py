@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from plants.tissue.image import Image
-from plants.tissue.labels import CAP, CHANNEL, CRITICAL, TUMOUR
+from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, NAMES, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.volume import Volume
 
@@ -33,6 +33,16 @@ AROUND = 0.01
 
 GROUND, TISSUE, VESSEL, FREE = 40, (237, 184, 107), (191, 26, 31), (115, 168, 230)
 GOOD, BAD = (38, 158, 76), (204, 56, 46)
+COLORS = np.array([(GROUND,) * 3, TISSUE, VESSEL, FREE, GOOD, BAD])
+
+SEEN_AS = np.zeros((len(NAMES), 2), np.int8)
+"""Which of COLORS, of each label, where it is gone and where it is not."""
+SEEN_AS[[TUMOUR, CAP, CHANNEL], 0] = 3
+SEEN_AS[[TUMOUR, CAP], 1] = 1
+SEEN_AS[CRITICAL] = 2
+
+SHARES = np.array([(0.0, 0.85, 0.85, 0.85, 0.6, 0.6), (0.0, 0.3, 0.3, 0.3, 0.5, 0.5)])
+"""Of each of COLORS over grey; fainter over a patient's image."""
 
 
 class Slices:
@@ -90,30 +100,25 @@ class Slices:
             is_good: Whether it is feasible.
         """
         volume, n = self.volume, np.arange(SIZE)
-        j, i = np.meshgrid(n, n, indexing="ij")
         corner = self.point(name, (0.0, 0.0), p_W)
         right = self.point(name, (1.0, 0.0), p_W) - corner
         down = self.point(name, (0.0, 1.0), p_W) - corner
-        p = corner + i[..., None] * right + j[..., None] * down
+        p = corner + n[:, None, None] * down + n[None, :, None] * right
         index = np.rint((p - volume.origin) / volume.spacing).astype(int)
         inside = ((index >= 0) & (index < volume.labels.shape)).all(axis=-1)
-        at = tuple(np.where(inside[..., None], index, 0).reshape(-1, 3).T)
-
-        def seen(mask: NDArray) -> NDArray[np.bool_]:
-            return mask[at].reshape(inside.shape) & inside
-
-        solid = seen(volume.tau == SOLID)
-        labels = np.where(inside, volume.labels[at].reshape(inside.shape), 0)
+        _, ny, nz = volume.labels.shape
+        at = np.where(
+            inside, (index[..., 0] * ny + index[..., 1]) * nz + index[..., 2], 0
+        )
+        label = np.where(inside, volume.labels.take(at), BRAIN)
+        seen = SEEN_AS[label, (volume.tau.take(at) == SOLID).astype(int)]
+        wanted = np.where(inside & shape.take(at), 4 if is_good else 5, 0)
         picture = np.repeat(self._greys(p)[..., None], 3, axis=-1)
-        share = 0.35 if self.image is not None else 0.85
-        tumour = np.isin(labels, (TUMOUR, CAP)) & solid
-        for mask, color in (
-            (tumour, TISSUE),
-            (labels == CRITICAL, VESSEL),
-            ((np.isin(labels, (TUMOUR, CAP, CHANNEL)) & ~solid), FREE),
-        ):
-            _tint(picture, mask, color, share)
-        _tint(picture, seen(shape), GOOD if is_good else BAD, 0.55)
+        for layer in (seen, wanted):
+            share = SHARES[int(self.image is not None)][layer]
+            for axis in (0, 1):  # borders stand out
+                share[(layer != np.roll(layer, 1, axis)) & (layer > 0)] = 1.0
+            picture += share[..., None] * (COLORS[layer] - picture)
         return np.rint(picture).astype(np.uint8)
 
     def _greys(self, p_W: Vector) -> Vector:
@@ -125,12 +130,3 @@ class Slices:
         return ndimage.map_coordinates(
             self.image.values, np.moveaxis(index, -1, 0), float, order=1
         )
-
-
-def _tint(
-    picture: Vector, mask: NDArray[np.bool_], color: tuple[int, ...], share: float
-) -> None:
-    """Colours a part of a picture, its border fully."""
-    border = mask & ~ndimage.binary_erosion(mask)
-    for part, weight in ((mask & ~border, share), (border, 1.0)):
-        picture[part] += weight * (np.array(color) - picture[part])

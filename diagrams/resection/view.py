@@ -62,7 +62,7 @@ def look_at(meshcat: Any, volume: Volume, X: NDArray | None = None) -> None:
     points = np.vstack([points, [0.0, 0.0, -0.7 * CHANNEL_LENGTH]])
     middle = X[:3, :3] @ ((points.min(axis=0) + points.max(axis=0)) / 2) + X[:3, 3]
     aside = X[:3, :3] @ [0.4, -0.9, 0.0] + [0.0, 0.0, 0.35]
-    away = middle + 1.3 * float(np.ptp(points, axis=0).max()) * aside
+    away = middle + 1.05 * float(np.ptp(points, axis=0).max()) * aside
     meshcat.SetTransform("/drake", RigidTransform(X))
     dress(meshcat, View(tuple(away), tuple(middle)))
 
@@ -103,7 +103,7 @@ def draw_tumour(
 
 
 def draw_around(meshcat: Any, session: Session) -> None:
-    """Draws channel, free space, what is critical, and where the tool has been."""
+    """Draws channel, free space, what is critical, and the last step's way."""
     volume = session.volume
     outside = Cylinder(volume.channel, CHANNEL_LENGTH)
     meshcat.SetObject("channel", outside, Rgba(*CHANNEL))
@@ -111,8 +111,9 @@ def draw_around(meshcat: Any, session: Session) -> None:
     _draw(meshcat, "free", volume, volume.tau != SOLID, FREE)
     # Thin things are not to fall between the voxels that are shown.
     _draw(meshcat, "critical", volume, volume.labels == CRITICAL, VESSEL, 1)
-    if len(session.tips) > 1:
-        meshcat.SetLine("trail", session.tips.T, 1.0, TRAIL)
+    last = session.steps[-1] if session.steps else None
+    if last is not None and last.last - last.first > 1:
+        meshcat.SetLine("trail", session.tips[last.first : last.last].T, 1.0, TRAIL)
     else:
         meshcat.Delete("trail")
 

@@ -90,11 +90,11 @@ def swings(run: Any) -> np.ndarray:
     """
     time, tip, tool = run.signals["time"], run.scenario.tip, run.snake.tool.p
     turns = np.array([turned(tip.circle, t) for t in time]) / (2 * np.pi)
-    last = np.floor(turns[-1] - 0.75)  # a way there and back ends at 3/4 of a turn
+    last = np.floor(turns[-1] - 1.25)  # from one end back at 1/4, there until 5/4
     if tip.way != "swing" or tip.poses or last < 0:
         return np.empty((0, 2, 3))
     quarter = np.linspace(-0.25, 0.25, 201)
-    there, back = last + quarter, last + 0.5 - quarter
+    there, back = last + 1.0 + quarter, last + 0.5 - quarter
 
     def at(turn: np.ndarray) -> np.ndarray:
         return np.column_stack([np.interp(turn, turns, column) for column in tool.T])

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
-from diagrams.snake.metrics import break_time, errors, judged
+from diagrams.snake.metrics import break_time, errors, judged, swings
 from plants.snake.actuation import wire_lengths
 from plants.snake.balls import corners_of, turns_of, turns_of_angles
 from plants.snake.parameters import MODULES, WIRES
@@ -173,9 +173,29 @@ def statics(run: Any) -> Figure:
     bottom.plot(time, 1e3 * least, color=COLORS["robot"])
     bottom.axhline(0.0, color="k", lw=0.8)
     bottom.set(ylabel="least eigenvalue\n[mN m/rad]", xlabel="time [s]")
+    bottom.set_yscale("symlog", linthresh=10.0)  # what friction holds is stiff
     _events(run, top, middle, bottom)
     if run.watch.alarm.time[-1] >= 0.0:
         bottom.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def loop(run: Any) -> Figure:
+    """The tool in the last swing, there and back, against the bend asked for."""
+    figure = new_figure(7.0, 4.6)
+    pairs, swing = swings(run) * MM, run.scenario.tip.swing
+    bend = np.degrees(max(swing.bends)) * np.sin(np.linspace(-0.5, 0.5, 201) * np.pi)
+    across = np.array([np.cos(swing.azimuth), np.sin(swing.azimuth), 0.0])
+    upper, lower = add_axes(figure, 1, 2, 1), add_axes(figure, 1, 2, 2)
+    for k, (name, color) in enumerate((("there", "robot"), ("back", "target"))):
+        upper.plot(bend, pairs[:, k] @ across, color=COLORS[color], label=name)
+    upper.set(xlabel="bend asked for [deg]", ylabel="tool, across [mm]")
+    upper.legend()
+    apart = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)
+    lower.plot(bend, apart, color=COLORS["accent"])
+    lower.set(
+        xlabel="bend asked for [deg]", ylabel="there from back [mm]", ylim=(0, None)
+    )
     return figure
 
 
@@ -184,6 +204,8 @@ def plots(run: Any) -> dict[str, Figure]:
     figures = {"path": path(run), "errors": pose_errors(run), "wires": wires(run)}
     if run.scenario.wires == "statics":
         figures["statics"] = statics(run)
+        if len(swings(run)):
+            figures["loop"] = loop(run)
     snapped = break_time(run.scenario)
     if snapped is not None and snapped < run.signals["time"][-1]:
         figures["break"] = break_closeup(run)

@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.geometry import Cylinder, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
-from diagrams.snake.wire_replay import draw_wires
+from diagrams.snake.wire_replay import draw_wires, put
 from plants.snake.actuation import wire_lengths
 from plants.snake.balls import turns_of
 from plants.snake.kinematics import centreline
@@ -36,15 +36,15 @@ def show_snake(meshcat: Any, x: Array, params: SnakeParams | None = None) -> Arr
         axis = points[i] - points[i - 1] if i else np.array([0.0, 0.0, 1.0])
         R_WP = RotationMatrix.MakeFromOneVector(axis, 2)
         middle = points[i] - params.half_pitch * R_WP.col(2)
-        meshcat.SetObject(f"snake/plate{i}", plate, Rgba(*PLATE))
-        meshcat.SetTransform(f"snake/plate{i}", RigidTransform(R_WP, middle))
+        X_WP = RigidTransform(R_WP, middle)
+        put(meshcat, f"snake/plate{i}", plate, Rgba(*PLATE), X_WP)
         if i < 6:
             ball = Sphere(params.ball_radius)
-            meshcat.SetObject(f"snake/ball{i}", ball, Rgba(*BRASS))
-            meshcat.SetTransform(f"snake/ball{i}", RigidTransform(points[i]))
+            X_WB = RigidTransform(points[i])
+            put(meshcat, f"snake/ball{i}", ball, Rgba(*BRASS), X_WB)
     if params.tool_radius > 0.0:
-        meshcat.SetObject("snake/tool", Sphere(params.tool_radius), Rgba(*SWEPT))
-        meshcat.SetTransform("snake/tool", RigidTransform(points[7]))
+        tool, X_WT = Sphere(params.tool_radius), RigidTransform(points[7])
+        put(meshcat, "snake/tool", tool, Rgba(*SWEPT), X_WT)
     draw_wires(meshcat, "snake/wires", turns_of(x), x[0], params)
     return wire_lengths(x, params)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import Capsule, Rgba
+from pydrake.geometry import Capsule, Rgba, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
 from plants.snake.parameters import SnakeParams
@@ -47,6 +47,15 @@ def wire_poses(
     return poses
 
 
+def put(
+    meshcat: Any, path: str, shape: Shape, rgba: Rgba, X_WG: RigidTransform
+) -> None:
+    """Draws a shape; one that is there is only moved, which a browser does fast."""
+    if not meshcat.HasPath(path):
+        meshcat.SetObject(path, shape, rgba)
+    meshcat.SetTransform(path, X_WG)
+
+
 def draw_wires(
     meshcat: Any, path: str, turns: np.ndarray, s: float, params: SnakeParams
 ) -> None:
@@ -55,8 +64,7 @@ def draw_wires(
     for name, X_WG in wire_poses(turns, s, params).items():
         length = chord if name.endswith("middle") else params.face
         color = Rgba(*COLORS[int(name[4]) // 3])
-        meshcat.SetObject(f"{path}/{name}", Capsule(WIRE_RADIUS, length), color)
-        meshcat.SetTransform(f"{path}/{name}", X_WG)
+        put(meshcat, f"{path}/{name}", Capsule(WIRE_RADIUS, length), color, X_WG)
 
 
 def animate_wires(

@@ -51,7 +51,7 @@ LIVE = Live(
     ),
     figures=lambda scenario: [
         WALL,
-        Figure("shaft off its fulcrum [mm]", error, 0.0, 20.0, 0.1),
+        Figure("off fulcrum [mm]", error, 0.0, 20.0, 0.1),
     ],
     words=allowed,
     moving=lambda session: session.read("robot.tool", RobotTool).tip,

@@ -100,7 +100,7 @@ class WallForce(StepBlock):
             "truth", self._calc_truth, {self._state.ticket(), self.time_ticket()}
         )
         outputs = dict(zip(("force", "fulcrum_error", "fulcrum"), gives, strict=True))
-        self._emit(truth, outputs, 0)
+        self._emit(truth.Eval, {truth.ticket()}, outputs, 0)
 
     def _calc_truth(self, context: Any) -> np.ndarray:
         stiffness = np.array([self._stiffness * self._factor(context.get_time())])

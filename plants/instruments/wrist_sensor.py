@@ -239,7 +239,12 @@ class WristSensor(StepBlock):
         }
         self._next = self.cached("next", self._calc_next, reads)
         last = size(Moving)
-        self._emit(self._next, {"felt": Felt, "mount": Mount}, last - size(Felt))
+        self._emit(
+            self._next.Eval,
+            {self._next.ticket()},
+            {"felt": Felt, "mount": Mount},
+            last - size(Felt),
+        )
         self.update_every(period, lambda context: self._next.Eval(context)[:last])
 
     def _calc_next(self, context: Any) -> np.ndarray:

@@ -223,7 +223,8 @@ def slid(
             now, pull, stiffness, wound, load, s, grip, min(AT_ONCE, most - total)
         )
         total, lost = total + count, lost or left
-        if (bound(now, to, s, grip) < BOUNDED and done) or total >= most:
+        stuck = count == 0 and not done
+        if (bound(now, to, s, grip) < BOUNDED and done) or stuck or total >= most:
             break
     heat = remembered(now, to, s, grip)
     n = 3 * MODULES if s.coupled else TURNS

@@ -95,7 +95,7 @@ def read_image(path: Path, transform: str = AUTO) -> Image:
     ending = [end for end in READERS if path.name.lower().endswith(end)]
     if not ending:
         raise MaskError(
-            f"expected a label map whose name ends in {', '.join(READERS)}; export "
+            f"expected a file whose name ends in {', '.join(READERS)}; export "
             "other kinds but DICOM (SEG, RTSTRUCT) as one of these"
         )
     reader = READERS[ending[0]]

@@ -403,7 +403,12 @@ class SnakeTask(StepBlock):
         self.signal_out("deviation", BodyDeviation, self._calc_deviation, aimed)
         self.signal_out("reference", ToolPose, self._calc_reference, state)
         last = size(Way)
-        self._emit(self._next, {"status": SnakeStatus, "cutting": Cutting}, last)
+        self._emit(
+            self._next.Eval,
+            {self._next.ticket()},
+            {"status": SnakeStatus, "cutting": Cutting},
+            last,
+        )
         self.update_every(
             p.period,
             lambda context: [

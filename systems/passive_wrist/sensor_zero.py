@@ -227,7 +227,12 @@ class SensorZeroing(StepBlock):
         )
         reads = {self.xd_ticket(), self._mount.ticket(), self._wrench.ticket()}
         self._next = self.cached("next", self._calc_next, reads)
-        self._emit(self._next, {"zeroed": Wrench, "zero": SensorZero}, MEMORY)
+        self._emit(
+            self._next.Eval,
+            {self._next.ticket()},
+            {"zeroed": Wrench, "zero": SensorZero},
+            MEMORY,
+        )
         self.update_every(params.period, self._calc_update)
 
     def _calc_next(self, context: Any) -> np.ndarray:

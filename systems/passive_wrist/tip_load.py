@@ -260,7 +260,12 @@ class TipLoad(StepBlock):
         )
         reads = {self.xd_ticket(), self._shaft.ticket(), self._wrench.ticket()}
         self._next = self.cached("next", self._calc_next, reads)
-        self._emit(self._next, {"wall": Wrench, "tip_force": TipForce}, _MEMORY)
+        self._emit(
+            self._next.Eval,
+            {self._next.ticket()},
+            {"wall": Wrench, "tip_force": TipForce},
+            _MEMORY,
+        )
         self.update_every(params.period, self._calc_update)
 
     def _calc_next(self, context: Any) -> np.ndarray:

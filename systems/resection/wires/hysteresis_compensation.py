@@ -56,6 +56,13 @@ class HysteresisCompensationParams:
     cutting: float = parameter(
         0.0, "force that it takes to oppose the motion", "N", least=0.0, most=3.0
     )
+    dither: float = parameter(
+        0.0,
+        "by which all wires are wound shorter and longer in turn",
+        "m",
+        least=0.0,
+        most=1e-3,
+    )
     steps: int = parameter(2, "of Gauss-Newton in a period", least=1, most=10)
     time_constant: float = parameter(
         0.1, "of the bias' low-pass", "s", least=0.01, most=100.0
@@ -194,8 +201,10 @@ class HysteresisCompensation(Block):
         force = opposing(p.cutting, wanted[:3] - last[:3], p.period)
         found, said, drums = None, state.said[0], self._wound(x, force)
         turns = self._model.ahead(grip)
+        shaken = p.dither * (-1.0) ** round(context.get_time() / p.period)
         for _ in range(p.steps):
             drums = self._wound(x + shift, force)
+            drums[:-1] += shaken
             found = self._model.equilibrium(
                 turns, wound=drums[:-1], force=force, grip=grip
             )

@@ -1,10 +1,10 @@
 """OpenIGTLink on loopback, with pyigtl's own server and client on the other side."""
 
-import json
 import math
 import signal
 import socket
 import time
+from types import SimpleNamespace
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -161,10 +161,37 @@ def test_damaged_messages_are_passed_over_and_garbage_ends_it():
         noise = rng.integers(0, 256, HEADER, dtype=np.uint8).tobytes()
         with pytest.raises(Garbage):
             Unpacker().feed(noise)
-    huge = bytearray(good)
-    huge[42:50] = (1 << 62).to_bytes(8, "big")
-    with pytest.raises(Garbage, match="a body of"):
-        Unpacker().feed(bytes(huge))
+    for size, told in ((1 << 62, "a body of"), (1 << 20, "a TRANSFORM of")):
+        huge = bytearray(good)
+        huge[42:50] = size.to_bytes(8, "big")
+        with pytest.raises(Garbage, match=told):
+            Unpacker().feed(bytes(huge))
+
+
+def test_whatever_comes_is_a_message_or_garbage():
+    """Bits flipped, bytes put in and cut off in a stream of good messages."""
+    sent = [transform("Target", TransformStatus="OK"), StatusMessage(device_name="S")]
+    sent += [PositionMessage(device_name="P"), text("T", "words")]
+    stream = b"".join(message.pack() for message in sent)
+    rng, whole = np.random.default_rng(7), 0
+    for _ in range(500):
+        data = bytearray(stream)
+        for _ in range(rng.integers(1, 4)):
+            data[rng.integers(len(data))] ^= 1 << rng.integers(8)
+        first = int(rng.integers(len(data)))
+        if rng.random() < 0.3:
+            data[first : first + int(rng.integers(9))] = rng.bytes(3)
+        tracker = Tracker(parse("igtl://localhost:1", "-", TOOLS), TOOLS)
+        try:
+            for message in Unpacker().feed(bytes(data)):
+                tracker._take(message)
+                whole += 1
+        except Garbage:
+            continue
+        for tool in TOOLS:
+            tip, u, _ = tracker.sighting(tool, LAST)
+            assert np.isfinite([tip, u]).all()
+    assert whole > 500
 
 
 # ---- frames and units
@@ -340,6 +367,7 @@ def test_slicer_is_told_what_is_where():
     slicer = pyigtl.OpenIGTLinkClient("127.0.0.1", stream.port)
     deaf = socket.create_connection(("127.0.0.1", stream.port))
     session = Session(load_scenario("gauze_static", seed=4), None, stream=stream)
+    assert session.scenario == load_scenario("gauze_static", seed=4)  # as it is written
 
     def heard(name):
         end = time.monotonic() + 5.0
@@ -371,16 +399,25 @@ def test_slicer_is_told_what_is_where():
     stream.close()
 
 
-def test_command_line(plus, tmp_path, capsys):
+def test_command_line(plus, tmp_path, capsys, monkeypatch):
+    ran = []
+
+    def run_scenario(scenario, out, *told):
+        ran.append(scenario)
+        return SimpleNamespace(metrics={}, error="")
+
+    monkeypatch.setattr("diagrams.live.command.run_scenario", run_scenario)
     tip = load_scenario("gauze_static").target.points[0]
     where = f"igtl://localhost:{plus.port}?target=Stylus&patience=inf"
     plus.send_message(transform("Stylus", 1e3 * np.array(tip)), wait=False)
     words = ["run", "gauze_static", "--duration", "0.3", "--no-replay"]
     words += ["--out", str(tmp_path), "--tracker", where, "--stream", "igtl://:0"]
     assert main(words) == 0
-    assert json.loads((tmp_path / "metrics.json").read_text())["system"] == "gauze"
     table = np.loadtxt(tmp_path / "target_recording.csv", delimiter=",", skiprows=1)
     assert np.atleast_2d(table)[-1, -1] == 1.0
+    # The tool that the address does not name goes on as it is written.
+    assert ran[0].target.tracked == str(tmp_path / "target_recording.csv")
+    assert ran[0].obstacles[0].tracked is None
     assert main(["run", "nav_one_static", "--tracker", where]) == 2
     assert "expected a gauze delivery" in capsys.readouterr().err
     assert main(["live", "gauze_static", "--tracker", "igtl:/x"]) == 2

@@ -102,6 +102,7 @@ def test_by_clicks_as_by_lines(page, tmp_path):
         target=lambda: desks.put(run_browser(tiny(), file, opened=addresses.put))
     )
     thread.start()
+    page.set_viewport_size({"width": 800, "height": 560})
     try:
         clicks = Clicks(page, addresses.get(timeout=120))
         clicks.slide("length", 8)
@@ -116,6 +117,7 @@ def test_by_clicks_as_by_lines(page, tmp_path):
         assert page.get_attribute("#words", "class") == "bad"
         assert "meets the wall of the channel" in page.inner_text("#answer")
         bad = clicks.scene()
+        page.evaluate("document.getElementById('scene').remove()")  # it is seen enough
         clicks.press("suggest")
         clicks.press("commit")
         clicks.press("undo")
@@ -123,11 +125,10 @@ def test_by_clicks_as_by_lines(page, tmp_path):
         clicks.change(lambda: page.press("#line", "Enter"))
         clicks.press("commit")
     finally:
-        if not addresses.empty() or page.url != "about:blank":
-            page.click("#quit")
+        page.click("#quit")
         thread.join(60)
-    assert greens(good) > 500 and pinks(good) == 0
-    assert pinks(bad) > 50 and greens(bad) < greens(good)
+    assert greens(good) > 100 and pinks(good) == 0
+    assert pinks(bad) > 20 and greens(bad) < greens(good)
     lines = [
         "entry 8 5.5 clipped",
         "commit",
@@ -142,6 +143,21 @@ def test_by_clicks_as_by_lines(page, tmp_path):
     assert desks.get(timeout=10).log == list(zip(lines, told, strict=True))
     assert told[-1].startswith("committed")
     assert file.read_bytes() == (tmp_path / "lines.session").read_bytes()
+
+
+def test_ctrl_c_keeps_the_session(tmp_path, monkeypatch):
+    file, turn = tmp_path / "ended.session", Desk.turn
+
+    def interrupted(desk):
+        if desk.console.session.steps:
+            raise KeyboardInterrupt
+        desk.want("line", "commit")
+        turn(desk)
+
+    monkeypatch.setattr(Desk, "turn", interrupted)
+    desk = run_browser(tiny(), file)
+    assert desk.is_over and "committed" in desk.log[-1][1]
+    assert by_lines(["list"], file)[0].startswith("1: entry")
 
 
 def test_a_preview_changes_nothing(desk):

@@ -171,6 +171,38 @@ def test_coupled_pairs_are_the_papers_snake():
     assert run.metrics["buckled_at"] is None
 
 
-def test_a_force_that_a_wire_model_does_not_know_is_refused():
-    with pytest.raises(ScenarioError, match=r"load\.force=.*without wires='statics'"):
-        load_scenario("snake_circle", ["load.force=[0.1,0,0]"])
+@pytest.mark.parametrize(
+    "override",
+    [
+        "load.force=[0.1,0,0]",
+        "load.cutting=0.1",
+        "friction.wire=0.1",
+        "compensation=model",
+    ],
+)
+def test_what_a_wire_model_does_not_know_is_refused(override):
+    key = override.split("=")[0].removesuffix(".wire")
+    with pytest.raises(ScenarioError, match=rf"{key}.*without wires='statics'"):
+        load_scenario("snake_circle", [override])
+
+
+def test_a_model_and_a_tracked_tool_help_a_snake_that_cuts():
+    helped, alone = (
+        simulate(load_scenario("snake_cut", [f"compensation={kind}"], 1, 2.5)).metrics
+        for kind in ("tracked", "none")
+    )
+    assert helped["rms_tool_error"] < 0.4e-3 < 0.5 * alone["rms_tool_error"]
+    assert helped["max_tool_error"] < 1.5e-3
+    assert helped["stops"] == 0 and helped["buckled_at"] is None
+    assert helped["min_tension"] == pytest.approx(0.3)
+
+
+def test_a_reversal_leaves_a_loop_with_friction_alone():
+    short = ["tip.circle={period: 2.0, ramp: 0.1}", "tip.swing.bends=[0.3, 0.3, 0.3]"]
+    rough, smooth = (
+        simulate(load_scenario("snake_reversal", [*short, *more], 1, 2.7))
+        for more in ([], ["friction={}"])
+    )
+    assert rough.metrics["loop_width"] > 0.3e-3
+    assert smooth.metrics["loop_width"] < 0.1e-3
+    assert "loop" in plots(rough)
