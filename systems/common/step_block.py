@@ -148,7 +148,7 @@ class StepBlock(Block):
         if shared:
             once = self.cached("step", run, tickets)
             run, tickets = once.Eval, {once.ticket()}
-        self._emit_anew(run, tickets, outputs, last)
+        self._emit(run, tickets, outputs, last)
         self.update_every(period, lambda context: run(context)[:last])
 
     def declare_update(
@@ -254,18 +254,14 @@ class StepBlock(Block):
         exec(source, names)
         return names["of_context"], tickets
 
-    def _emit(self, shared: Any, outputs: Mapping[str, Any], first: int) -> None:
-        """Declares outputs that are the shared array's parts from `first` on."""
-        self._emit_anew(shared.Eval, {shared.ticket()}, outputs, first)
-
-    def _emit_anew(
+    def _emit(
         self,
         run: Callable[[Any], np.ndarray],
         tickets: set[Any],
         outputs: Mapping[str, Any],
         first: int,
     ) -> None:
-        """As `_emit`, of an array that is computed for each of them."""
+        """Declares outputs that are an array's parts from `first` on."""
         for name, signal in outputs.items():
             last = first + length(signal)
 
