@@ -116,6 +116,7 @@ FIGURES = {
     "max_axis_error": Figure("rad", "of the tool's axis, greatest"),
     "max_split": Figure("rad", "greatest between the bends of a module's balls"),
     "max_torsion": Figure("rad", "greatest of a ball"),
+    "loop_width": Figure("m", "tool there and back at the same bend, greatest"),
     "least_eigenvalue": Figure("N m/rad", "least of the energy's Hessian"),
     "buckled_at": Figure("s", "when the snake was noticed to be lost"),
     "min_tension": Figure("N", "least of any wire"),

@@ -191,6 +191,8 @@ COMMANDS = {
     "FuzzyArbiter": {"v_R": RATE},
     "GoToTarget": {"v1": RATE},
     "GuidedTool": {"tip_velocity": RATE},
+    "HandNavigation": {"tool": TOOL},
+    "HysteresisCompensation": {"drums": HELD},
     "JointCommands": {"posture": HELD, "set_point": HELD},
     "OrcaPlanner": {"v_R": RATE},
     "PassiveWristEmulation": {"tool": TOOL},
@@ -201,6 +203,7 @@ COMMANDS = {
     "TissuePress": {"v_R": RATE},
     "ToolBypass": {"v1": RATE},
     "ToolNavigation": {"tool": TOOL},
+    "TrackedTool": {"tip_velocity": RATE},
     "TubeTask": {"tool": TOOL},
     "UnicycleControl": {"command": RATE},
     "VelocityCorrections": {"v2": RATE},
@@ -218,10 +221,10 @@ OBSERVE = {
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
     *("NavigationMonitor", "TissueForce", "WallWrench"),
-    "SensorZeroing",
+    *("GuidedDisc", "SensorZeroing", "ToolTracker"),
 }
 """Blocks that command nothing."""
-LEAD = {"ProcedurePlayer", "TipReference"}
+LEAD = {"Outside", "ProcedurePlayer", "TipReference"}
 """Blocks that command without an input."""
 BROKEN = {"nan": np.nan, "inf": np.inf, "-inf": -np.inf}
 GO_ON = {

@@ -204,10 +204,9 @@ class HysteresisCompensation(Block):
         shaken = p.dither * (-1.0) ** round(context.get_time() / p.period)
         for _ in range(p.steps):
             drums = self._wound(x + shift, force)
-            drums[:-1] += shaken
-            found = self._model.equilibrium(
-                turns, wound=drums[:-1], force=force, grip=grip
-            )
+            wound = view(Drums, drums).wires
+            wound += shaken
+            found = self._model.equilibrium(turns, wound=wound, force=force, grip=grip)
             turns = found.turns
             said = self._pose(found.turns, x[0] + shift[0])
             step = aimed(x + shift, wanted - bias - said, self._snake)
