@@ -30,6 +30,8 @@ DRAWN = 1.0 / 30.0
 """Between two pictures, and what other programs are told [s]."""
 READ = 0.1
 """Between two updates of the figures [s]."""
+BEHIND = 0.05
+"""By which a session may lag and catch up; what it is later than that is lost [s]."""
 NEVER = 1e5
 """When a fault begins that nobody has asked for [s]."""
 USUAL = ("pause", "reset", "another seed", "end and save")
@@ -296,8 +298,8 @@ class Session:
             self.lag.append(max(0.0, late))
             if late < 0.0:
                 sleep(-late)
-            else:
-                due += late  # what is lost is not made up for in a rush
+            else:  # all of it would be made up for in a rush
+                due += max(0.0, late - BEHIND)
 
     def save(self, folder: Path) -> Any:
         """Writes the tape of all that was guided.

@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from diagrams.common.plots import COLORS, add_axes, new_figure, save_figure
 from diagrams.common.progress import Progress, progress_bar
@@ -28,7 +27,7 @@ from diagrams.resection.scenario import ResectionScenario
 from plants.tissue.labels import CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.tissue import Tissue
-from plants.tissue.yielding import Field, YieldingTissue
+from plants.tissue.yielding import Field, YieldingTissue, apart
 from systems.common.archive import whole
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.reach import find_reach
@@ -228,10 +227,7 @@ def away_from(
     points: NDArray[np.float64], where: NDArray[np.bool_], volume: Any
 ) -> NDArray[np.float64]:
     """Points that lie beside certain voxels are left out: it is not known when cut."""
-    far = ndimage.distance_transform_edt(~where)
-    index = np.rint((points - volume.origin) / volume.spacing).astype(int)
-    index = np.clip(index, 0, np.array(far.shape) - 1)
-    kept = points[far[tuple(index.T)] > BESIDE]
+    kept = points[apart(volume, points, where, BESIDE)]
     return kept if len(kept) else points[:1]
 
 

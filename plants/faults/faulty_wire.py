@@ -111,9 +111,9 @@ class FaultyWire(Block):
 
     def _calc_told(self, context: Any) -> np.ndarray:
         whole = self._whole.Eval(context).copy()
-        *before, is_on, _ = context.get_discrete_state_vector().value()
-        if is_on:
-            self._breaks(whole, np.array(before), self._fault.size, self._period)
+        state = context.get_discrete_state_vector().value()
+        if state[-2]:
+            self._breaks(whole, state[:-2], self._fault.size, self._period)
         return whole
 
     def strike(self, root: Any) -> float:
@@ -135,4 +135,4 @@ class FaultyWire(Block):
     def _update(self, context: Any) -> np.ndarray:
         start = context.get_discrete_state_vector().value()[-1]
         is_on = self._is_on(context.get_time() + self._period, start)
-        return np.array([*self._calc_told(context), is_on, start])
+        return np.append(self._calc_told(context), (is_on, start))

@@ -35,6 +35,9 @@ BLUR = 2.0
 LENGTHS = (1.5, 3.0)
 """Of the field's waves, in lengths of the tumour."""
 
+CLEAR = 2.5
+"""Voxels about the channel in which a scan tells nothing."""
+
 STEP = 0.1e-3
 """Of the displacement, in m, at which the tissue is set anew."""
 
@@ -251,7 +254,7 @@ class YieldingTissue:
         """Points of the cavity's surface as a scan has them, (n, 3) in W, in m."""
         m, volume = self.material, self.material.volume
         points, _ = surface(m.gone | m.fixed, volume.origin, volume.spacing)
-        points = points[apart(m, points, m.fixed)]
+        points = points[apart(volume, points, m.fixed, CLEAR)]
         return self._seen(points, params, params.noise, rng)
 
     def image(
@@ -288,10 +291,12 @@ class YieldingTissue:
         return points + noise * rng.normal(size=points.shape)
 
 
-def apart(m: Material, points: Array, other: NDArray) -> NDArray[np.bool_]:
-    """Which points of a surface do not lie at what is another's, (n,)."""
-    far = ndimage.distance_transform_edt(~other)
-    index = np.rint((points - m.volume.origin) / m.volume.spacing).astype(int)
+def apart(
+    volume: Volume, points: Array, where: NDArray, least: float
+) -> NDArray[np.bool_]:
+    """Which points (n, 3) lie more than so many voxels from certain ones, (n,)."""
+    far = ndimage.distance_transform_edt(~where)
+    index = np.rint((points - volume.origin) / volume.spacing).astype(int)
     index = np.clip(index, 0, np.array(far.shape) - 1)
-    told: NDArray[np.bool_] = far[tuple(index.T)] > 2.5
+    told: NDArray[np.bool_] = far[tuple(index.T)] > least
     return told

@@ -9,6 +9,7 @@ that instant, is its bias, which is low-passed and aimed off by.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,12 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import tool_pose, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.friction import SnakeFrictionParams, flat_grip, grip_of
+from plants.snake.friction import (
+    SHAPES,
+    SnakeFrictionParams,
+    flat_grip,
+    grip_of,
+)
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array
 from plants.snake.signals import REST, Drums, Posture
@@ -113,7 +119,8 @@ class Compensation(NamedTuple):
     said: Array
 
 
-PARTS = np.cumsum([204, 7, 7, 6])
+PARTS = np.cumsum([sum(map(math.prod, SHAPES)), 7, 7, 6])
+"""Where in the state a `Compensation`'s parts begin, but the first."""
 
 
 class HysteresisCompensation(Block):
@@ -199,7 +206,6 @@ class HysteresisCompensation(Block):
         h, tool = self._snake.half_pitch, self._snake.tool_offset
         wanted, last = (_poses(y, h, tool, 1e-7, unused) for y in (x, state.x))
         force = opposing(p.cutting, wanted[:3] - last[:3], p.period)
-        found, said, drums = None, state.said[0], self._wound(x, force)
         turns = self._model.ahead(grip)
         shaken = p.dither * (-1.0) ** round(context.get_time() / p.period)
         for _ in range(p.steps):
@@ -211,7 +217,7 @@ class HysteresisCompensation(Block):
             said = self._pose(found.turns, x[0] + shift[0])
             step = aimed(x + shift, wanted - bias - said, self._snake)
             shift = np.clip(shift + step, -MOST, MOST)
-        if found is None or not np.isfinite(flat_grip(found.grip)).all():
+        if not np.isfinite(flat_grip(found.grip)).all():
             return values, self._wound(state.x + state.shift)
         memory = np.vstack([said, state.said[:-1]])
         after = Compensation(flat_grip(found.grip), x, shift, bias, memory)

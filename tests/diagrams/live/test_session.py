@@ -171,6 +171,25 @@ def test_real_time_is_kept_when_the_machine_can(page):
     assert len(session.lag) == 30
 
 
+@pytest.mark.parametrize(("late", "lost"), [(0.04, 0.0), (0.2, 0.15)])
+def test_a_late_frame_is_made_up_for_but_not_a_long_one(page, monkeypatch, late, lost):
+    session = Session(load_scenario("gauze_static", seed=4), page)
+    frame, now = session._live.frame, [10.0]
+
+    def step():
+        session.time += frame
+        now[0] += late + frame if session.time == pytest.approx(2 * frame) else 0.0
+
+    monkeypatch.setattr(session, "frame", step)
+    monkeypatch.setattr("diagrams.live.session.perf_counter", lambda: now[0])
+    monkeypatch.setattr(
+        "diagrams.live.session.sleep", lambda time: now.__setitem__(0, now[0] + time)
+    )
+    session.play(20 * frame)
+    assert now[0] - 10.0 == pytest.approx(20 * frame + lost)
+    assert max(session.lag) == pytest.approx(late) and session.lag[-1] == 0.0
+
+
 def test_other_systems_and_empty_sessions_are_refused(page, tmp_path, monkeypatch):
     session = Session(load_scenario("gauze_static"), page)
     with pytest.raises(ScenarioError, match="before it began"):
