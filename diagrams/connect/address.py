@@ -103,7 +103,8 @@ def _numbers(text: str, count: int, key: str, refuse: Any) -> list[float]:
     except ValueError:
         numbers = []
     is_told = not any(map(math.isnan, numbers))
-    if len(numbers) != count or not (is_told and (count == 1 or max(numbers) < 1e5)):
+    far = count > 1 and max(map(abs, numbers), default=0.0) >= 1e5
+    if len(numbers) != count or far or not is_told:
         meaning = "X,Y,Z in mm,ROLL,PITCH,YAW in degrees" if count > 1 else "seconds"
         raise refuse(f"{key}={meaning}")
     return numbers

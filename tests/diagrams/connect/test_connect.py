@@ -103,6 +103,8 @@ def test_an_address_and_what_is_agreed_upon():
         ("igtl://a:1?tarjet=X", "did you mean 'target'"),
         ("igtl://a:1?frame=1,2", "frame=X,Y,Z in mm"),
         ("igtl://a:1?frame=nan,0,0,0,0,0", "frame=X,Y,Z in mm"),
+        ("igtl://a:1?frame=-inf,0,0,0,0,0", "frame=X,Y,Z in mm"),
+        ("igtl://a:1?frame=0,0,-1e6,0,0,0", "frame=X,Y,Z in mm"),
         ("igtl://a:1?axis=w", "axis one of x, y, z, -x"),
         ("igtl://a:1?patience=0", "patience > 0 s"),
     ],
