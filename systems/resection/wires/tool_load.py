@@ -31,6 +31,9 @@ class ToolLoadParams:
     cutting: float = parameter(
         0.0, "that opposes the tool's motion besides", "N", least=0.0, most=3.0
     )
+    tissue: float = parameter(
+        60.0, "stiffness of what is cut, until it gives way", "N/m", above=0, most=1e5
+    )
     period: float = parameter(
         0.02, "over which its motion is taken", "s", least=1e-3, most=0.1
     )
@@ -45,6 +48,24 @@ def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
     speed = np.linalg.norm(moved) / time
     against: np.ndarray = -force / max(speed, SLOW) * moved / time
     return against
+
+
+def resisting(
+    before: np.ndarray, moved: np.ndarray, stiffness: float, most: float
+) -> np.ndarray:
+    """What tissue does to a tool in N (3,): it is drawn along until it gives way.
+
+    A force that followed the sign of the last motion at once would have a tool that is
+    slow chatter, a sample to and a sample fro.
+
+    Args:
+        before: What it did before, (3,).
+        moved: The tool's way since, (3,) in m.
+        stiffness: Of tissue, in N/m.
+        most: At which it gives way, in N.
+    """
+    f: np.ndarray = before - stiffness * moved
+    return f * min(1.0, most / max(float(np.linalg.norm(f)), 1e-300))
 
 
 class ToolLoad(Block):
@@ -71,8 +92,11 @@ class ToolLoad(Block):
         if not self._tool.HasValue(context):
             return np.array(last)
         p = np.array(view(ToolPose, self._tool.Eval(context)).p)
-        against = opposing(self._params.cutting, p - last[:3], self._params.period)
-        return np.append(p, np.where(np.isfinite(against), against, 0.0))
+        if not np.isfinite(p).all():
+            return np.array(last)
+        c = self._params
+        moved = p - last[:3] if np.isfinite(last).all() else np.zeros(3)
+        return np.append(p, resisting(last[3:], moved, c.tissue, c.cutting))
 
     def _calc_force(self, context: Any) -> np.ndarray:
         p = self._params

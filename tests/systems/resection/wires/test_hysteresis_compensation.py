@@ -113,13 +113,14 @@ def test_a_tracker_is_late_and_errs():
     assert math.acos(told[5][5]) == pytest.approx(math.radians(0.5), rel=1e-3)
 
 
-def test_cutting_opposes_the_last_motion():
-    dut = ToolLoad(ToolLoadParams(cutting=0.3))
+def test_cutting_resists_until_tissue_gives_way():
+    dut = ToolLoad(ToolLoadParams(cutting=0.3, tissue=60.0))
     context = dut.CreateDefaultContext()
-    for p in ([0.0, 0.0, 0.04], [0.0, 1e-3, 0.04]):
-        dut.GetInputPort("tool").FixValue(context, [*p, 0.0, 0.0, 1.0])
+    told = []
+    for y in (0.0, 1e-3, 10e-3, 8e-3, math.nan):
+        dut.GetInputPort("tool").FixValue(context, [0.0, y, 0.04, 0.0, 0.0, 1.0])
         tick(dut, context)
-    f = dut.GetOutputPort("force").Eval(context)
-    np.testing.assert_allclose(f, [0.0, -0.3, 0.0], atol=1e-12)
-    tick(dut, context)
-    np.testing.assert_allclose(dut.GetOutputPort("force").Eval(context), 0, atol=1e-12)
+        told.append(dut.GetOutputPort("force").Eval(context).tolist())
+    # Drawn along by 1 mm; cut; let go of by 2 mm; a place that is none says nothing.
+    assert [f[1] for f in told] == pytest.approx([0.0, -0.06, -0.3, -0.18, -0.18])
+    assert all(f[0] == f[2] == 0.0 for f in told)
