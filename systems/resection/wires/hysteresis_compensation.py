@@ -34,7 +34,6 @@ from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check, parameter, part
 from systems.common.signal import view
-from systems.resection.wires.tool_load import opposing
 from systems.resection.wires.tool_tracker import TrackedTool
 from systems.resection.wires.wire_inverse_actuation import (
     WireInverseActuationParams,
@@ -49,6 +48,9 @@ DAMPING = 3e-4
 """Of the step, in m/rad: singular directions are left alone."""
 MOST = np.array([0.01, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35])
 """By which a posture is moved at most."""
+SLOW = 1e-3
+"""Speed in m/s below which the model takes cutting to resist the
+less, the slower the tool is to be."""
 FRAMES = 16
 """Instants whose prediction is kept for frames that come late."""
 
@@ -99,6 +101,13 @@ def aimed(x: Array, off: Array, snake: SnakeParams) -> Array:
     solved = np.linalg.solve(A @ A.T + DAMPING**2 * np.eye(6), weight * off)
     step: Array = SCALE * (A.T @ solved)
     return step
+
+
+def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
+    """The model's force in N against a way (3,) in m that took some time in s."""
+    speed = np.linalg.norm(moved) / time
+    against: np.ndarray = -force / max(speed, SLOW) * moved / time
+    return against
 
 
 class Compensation(NamedTuple):

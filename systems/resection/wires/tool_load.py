@@ -10,9 +10,6 @@ from systems.common.block import Block
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import view
 
-SLOW = 1e-3
-"""Speed in m/s below which cutting resists the less, the slower the tool is."""
-
 
 @dataclass
 class ToolLoadParams:
@@ -41,13 +38,6 @@ class ToolLoadParams:
     def rules(self) -> Rules:
         """It takes time to grow."""
         yield self.start < self.end, "end", f"> start={self.start:g} s"
-
-
-def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
-    """A force in N against a way (3,) in m that took some time in s."""
-    speed = np.linalg.norm(moved) / time
-    against: np.ndarray = -force / max(speed, SLOW) * moved / time
-    return against
 
 
 def resisting(
