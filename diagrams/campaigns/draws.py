@@ -229,6 +229,8 @@ def _patient(tape: Tape) -> dict[str, Any]:
         size = tape.uniform("push.size", 0.001, 0.005)
         values["wall_motion.step"] = [size * cos(side), size * sin(side), 0.0]
         values["wall_motion.step_time"] = tape.uniform("push.time", 3.0, 8.0)
+        # Within a sample it would be a load that no arm can go before.
+        values["wall_motion.step_duration"] = tape.uniform("push.length", 0.1, 0.5)
     return values
 
 

@@ -55,6 +55,7 @@ from systems.bypass.distance_rate import (
     tip_rates,
 )
 from systems.bypass.dodge import driven_time, must_dodge
+from systems.bypass.hidden_tool import must_withdraw, were_seen
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
 from systems.bypass.organ_rows import organ_rows
 from systems.bypass.shadow_body import read_tool
@@ -99,6 +100,8 @@ _TROCAR = 6
 """Numbers that are kept of a trocar."""
 _MISSED = 1e-3
 """A row is missed by more than the solver's own error, m/s."""
+_WITHDRAWS = CALM._replace(dodge=1.0, escape=1.0)
+"""What the constraint does where a lost tool may come."""
 
 
 @dataclass
@@ -174,6 +177,7 @@ def constrain(
     dodging: np.ndarray,
     drift: np.ndarray,
     organs: Organs | None = None,
+    withdraws: bool = False,
 ) -> tuple[Vector, np.ndarray, ClearanceStatus]:
     """One step: the tip's velocity nearest to the wanted one that is safe.
 
@@ -188,6 +192,7 @@ def constrain(
         dodging: Whether R dodges each of them, 1 or 0; as many or more.
         drift: Velocities of R's trocar and of theirs, rows, m/s; one more.
         organs: What else to keep clear of; None is compiled away.
+        withdraws: Whether R dodges anyway.
 
     Returns:
         The tip's velocity in m/s, whether R dodges each tool, and the status.
@@ -196,7 +201,8 @@ def constrain(
     q, u = norm(shaft), unit(shaft)
     turning = fastest_sideways(workspace, q, params.turning_speed)
     dodges = np.zeros(len(dodging))
-    least, is_near, holds, dodge, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0, 0.0
+    least, is_near, holds, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0
+    dodge = 1.0 if withdraws else 0.0
     escape, blind, left = 0.0, 0.0, UNHINDERED
     e, _ = lateral_basis(u)
     near = params.obstacle_speed / params.rate
@@ -309,10 +315,17 @@ def hold(
     """One step of the block, among organs or, None, without."""
     v = v_R.v if all_finite(v_R.v) else (0.0, 0.0, 0.0)
     numbers = finite_guide(guide) and finite_tool(robot) and finite_cone(view_cone)
-    if not (all_usable(obstacles) and numbers):
+    if not (numbers and were_seen(obstacles)):
         return np.zeros(len(known)), Velocity(v), CALM
     g, s = robot.fulcrum, guide.s
     tools = obstacle_tools(margins, g, obstacles, target, camera)
+    withdraws = params.active and params.dodge
+    withdraws = withdraws and must_withdraw(params, g, robot.tip, tools, obstacles)
+    if not all_usable(obstacles):
+        if not withdraws:
+            return np.zeros(len(known)), Velocity(v), CALM
+        out = scaled(-s * params.max_speed, unit(sub(robot.tip, g)))
+        return np.zeros(len(known)), Velocity(out), _WITHDRAWS
     count = len(known) // (1 + _TROCAR)
     after = known.copy()
     places = after[count:].reshape((count, _TROCAR))
@@ -332,6 +345,7 @@ def hold(
         known[: count - 1],
         places[:, 3:],
         organs,
+        withdraws,
     )
     after[: count - 1] = dodges
     return after, Velocity(scaled(s, v)), status
@@ -382,10 +396,11 @@ def _step_among(
 class ClearanceConstraint(StepBlock):
     """Holds a hard clearance to the surgeon's tools under any planner.
 
-    After the fuzzy sum, before the tool's navigation; see the module. While an
-    obstacle's estimate is not usable or an input is not finite the velocity passes as
-    it is: then the arbiter slows R down and the navigation stops it. While S is lost R
-    only evades. A wanted velocity that is not finite counts as zero.
+    After the fuzzy sum, before the tool's navigation; see the module. While an input
+    is not finite or a tool was never seen the velocity passes as it is: then the
+    arbiter slows R down and the navigation stops it. So it does while a tool is lost,
+    until R must withdraw (`hidden_tool`). While S is lost R only evades. A wanted
+    velocity that is not finite counts as zero.
 
     Port ``v_R`` accepts the wanted `Velocity` of the guide point.
     Port ``guide`` accepts the `Guide`, of which s is used.

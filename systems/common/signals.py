@@ -48,6 +48,10 @@ class Estimate(NamedTuple):
     age: Annotated[float, Field("s", "of the last good frame", 0.0)]
 
 
+NEVER_SEEN = 1.0
+"""An estimate's standard deviation before the tool was ever seen [m]."""
+
+
 class ViewCone(NamedTuple):
     """What the endoscope sees."""
 

@@ -37,6 +37,7 @@ from systems.common.signal import Field, Many, Vector, example, vector
 from systems.common.signals import (
     CALM,
     FREE,
+    NEVER_SEEN,
     UNHINDERED,
     ClearanceStatus,
     Estimate,
@@ -57,8 +58,6 @@ from systems.common.signals import (
 from systems.common.step_block import StepBlock
 from systems.common.stops import Stop
 
-NEVER_SEEN = 1.0
-"""An estimate's standard deviation before the tool was ever seen [m]."""
 START = example(RobotTool)
 _DOWN = (0.0, 0.0, -1.0)
 """The shaft's direction where it has none."""
@@ -278,13 +277,14 @@ def why_stop(
 def evades(reason: Stop, code: float) -> bool:
     """Whether a tool that must stand still gets out of another one's way.
 
-    Not if it does not know where the tools are or where it is itself, and not while
+    Not if it never saw the tools or does not know where it is itself, and not while
     the arm gives way to a loaded wall.
     """
     if reason == Stop.MOVING:
         return code == float(Stop.PROBING.value)
     return reason in (
         Stop.TARGET_LOST,
+        Stop.OBSTACLE_LOST,
         Stop.OUT_OF_REACH,
         Stop.OUT_OF_VIEW,
         Stop.NOT_FOLLOWED,
@@ -362,8 +362,9 @@ class ToolNavigation(StepBlock):
     The share itself is kept before the evasion of tools, by the clearance constraint.
 
     Port ``clearance`` accepts the constraint's `ClearanceStatus`; calm without a wire.
-    While it escapes from a tool it is faster and may leave the view, and a target that
-    is lost or out of reach, a probe of the wall or an arm that lags do not stop it.
+    While it escapes from a tool it is faster and may leave the view, and a tool that
+    is lost, a target out of reach, a probe of the wall or an arm that lags do not stop
+    it.
 
     Port ``tool`` emits the commanded `ToolMotion`.
 

@@ -31,8 +31,8 @@ def test_no_contact_and_the_condition_held(name):
 
 
 def test_the_condition_does_not_hold_of_a_hand_out_of_sight():
-    figures = run("gauze_lost_sight").metrics  # for a part of 1.25 s, near O
-    assert 0.8 < figures["evasion_condition_held"] < 0.95
+    stands = run("gauze_lost_sight", "clearance_constraint.dodge=false").metrics
+    assert 0.8 < stands["evasion_condition_held"] < 0.95  # 1.25 s, near O
 
 
 def test_crossed_is_passed_where_the_paper_stalls():

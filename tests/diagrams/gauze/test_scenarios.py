@@ -70,7 +70,8 @@ def test_every_scenario_delivers_without_contact(name):
     figures = run(f"gauze_{name}").metrics
     assert set(figures) >= KEYS
     assert figures["reached"] and not figures["contact"]
-    assert figures["time_in_view"] == 1.0
+    withdraws = name == "lost_sight"  # out of the endoscope's view, too
+    assert figures["time_in_view"] >= (0.8 if withdraws else 1.0)
     assert figures["max_lateral_force"] < 0.5
     assert figures["max_fulcrum_error"] < 0.6e-3
     assert figures["joint_limit_time"] == 0.0
@@ -181,19 +182,23 @@ def test_any_recording_is_run_and_its_contact_reported(tmp_path, motion, contact
     assert r.metrics["min_tool_clearance"] == pytest.approx(min(axes) - radii, abs=3e-4)
 
 
-def test_lost_sight_stops_and_goes_on():
+def test_lost_sight_stops_it_or_lets_it_withdraw_and_it_goes_on():
+    """S is lost first, and it stands; then O is, and it leaves along its shaft."""
     r = run("gauze_lost_sight")
-    reasons = [stop["reason"] for stop in r.metrics["stops"]]
-    assert len(reasons) == 2
-    assert all("lost" in reason for reason in reasons)
-    time = r.signals["time"]
-    speed = np.linalg.norm(r.navigation.tool.v, axis=1)
-    for stop in r.metrics["stops"]:
-        still = (time > stop["start"] + 0.2) & (
-            time < stop["start"] + stop["duration"] - 0.02
-        )
-        assert speed[still].max() == 0.0
-    assert gap(r, "obstacle").min() > 0.005
+    first, second = r.metrics["stops"]
+    assert "target lost" in first["reason"]
+    time, tool = r.signals["time"], r.navigation.tool
+    speed = np.linalg.norm(tool.v, axis=1)
+
+    def within(stop, after):
+        end = stop["start"] + stop["duration"] - 0.02
+        return (time > stop["start"] + after) & (time < end)
+
+    assert speed[within(first, 0.2)].max() == 0.0
+    out = within(second, -0.05)
+    assert tool.tip[out][-1][2] > tool.tip[out][0][2] + 0.03
+    assert np.linalg.norm(np.cross(tool.u[out], tool.u[out][0]), axis=1).max() < 0.02
+    assert r.metrics["reached"] and gap(r, "obstacle").min() > 0.005
 
 
 def test_gauze_on_a_patient_who_breathes():

@@ -153,7 +153,8 @@ def test_why_the_robot_stands(changes, stop):
         ({"target": TARGET._replace(known=0.0)}, True),
         ({"permission": Permission(0.0, float(Stop.PROBING))}, True),
         ({"permission": Permission(0.0, float(Stop.WALL_LOADED))}, False),
-        ({"obstacles": [TARGET._replace(known=0.0)]}, False),
+        ({"obstacles": [TARGET._replace(known=0.0)]}, True),
+        ({"obstacles": [TARGET._replace(known=0.0, sigma_p=1.0)]}, False),
     ],
 )
 def test_out_of_a_tools_way_it_is_faster_and_leaves_the_view(changes, goes):
