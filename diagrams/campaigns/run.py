@@ -29,6 +29,8 @@ from systems.common.archive import whole
 
 _FLUSH = 10.0
 """Seconds between parts."""
+_COMPILED = 1200.0
+"""Seconds that the kernels may take before the first run, on a slow machine."""
 _FREE = ("description", "runs", "measure", "worst", "stop", "time_limit", "tries")
 """What may change in a folder of a campaign that was begun."""
 
@@ -196,7 +198,8 @@ def trial(out: Path, campaign: Campaign, base: Any) -> dict[str, Any]:
             job["overrides"] = campaign.fixed | campaign.variants.get(
                 job["variant"], {}
             )
-        child = Child(campaign.act, campaign.limits)
+        limits = campaign.limits
+        child = Child(campaign.act, replace(limits, time=limits.time + _COMPILED))
         try:
             answer = child.ask(job)
         finally:
