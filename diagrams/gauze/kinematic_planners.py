@@ -21,6 +21,7 @@ from systems.auto_guidance.velocity_corrections import VelocityCorrectionsParams
 from systems.bypass import (
     clearance_constraint,
     obstacle_tools,
+    safe_velocity,
     tool_bypass,
     workspace,
 )
@@ -219,7 +220,7 @@ class Constrained:
         if not len(self._dodging):
             self._dodging = np.zeros(len(tools))
         v: Vector
-        v, self._dodging, status = clearance_constraint.constrain(
+        v, self._dodging, status = safe_velocity.constrain(
             self._record,
             ROOM,
             NO_CONE,

@@ -1,6 +1,6 @@
 """How the distance of R to what it must keep clear of changes: d rho/dt = A . v - c.
 
-See `clearance_constraint` for the equation. It holds for the shafts' closest points,
+See `safe_velocity` for the equation. It holds for the shafts' closest points,
 inside and above the wall, for the ends of shafts that are nearly parallel, and for
 organs (`organ_rows`).
 """

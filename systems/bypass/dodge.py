@@ -1,4 +1,4 @@
-"""Dodge: when R retracts from a tool that sweeps it; see `clearance_constraint`."""
+"""Dodge: when R retracts from a tool that sweeps it; see `safe_velocity`."""
 
 from math import sqrt
 from typing import Any

@@ -1,7 +1,7 @@
 """The hard clearance to organs: rows for the constraint, beside those of the tools.
 
 With the distance d of a point of the shaft at the proportion s, its gradient n and the
-organ's own velocity v_T, as for a tool (`clearance_constraint`)
+organ's own velocity v_T, as for a tool (`safe_velocity`)
 
     A . v >= n . v_T - gamma (d - D),    A = s n + (1 - s) (n . u) u,
 

@@ -27,7 +27,7 @@ from plants.organs.distance_grid import build, triangle_distance
 from plants.organs.organs import PLAN_ROOM
 from plants.organs.shapes import SHAPES, shape
 from plants.organs.surface import Surface
-from systems.bypass import clearance_constraint, tool_bypass, workspace
+from systems.bypass import clearance_constraint, safe_velocity, tool_bypass, workspace
 from systems.bypass.clearance_constraint import ClearanceConstraintParams
 from systems.bypass.organ_route import Found, choose_way_over, on_the_way, organ_room
 from systems.bypass.shadow_body import pose_distance, read_tool
@@ -228,7 +228,7 @@ def run(one: Scene, bypass: bool) -> Outcome:
             way = tool_bypass.Choice(unit(d), norm(d), 0, 0, one.goal)
         v_tip = tool_bypass.follow(BYPASS, v_tip, PLANNER_PERIOD, G, way)
         still = np.zeros((1 + len(tools), 3))
-        v, dodging, _ = clearance_constraint.constrain(
+        v, dodging, _ = safe_velocity.constrain(
             CONSTRAINT, ROOM, NO_CONE, G, p, v_tip, tools, dodging, still, organs
         )
         p = ROBOT.moved(G, p, v, PLANNER_PERIOD)

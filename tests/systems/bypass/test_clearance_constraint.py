@@ -9,10 +9,10 @@ from systems.bypass import clearance_constraint, obstacle_tools, workspace
 from systems.bypass.clearance_constraint import (
     ClearanceConstraint,
     ClearanceConstraintParams,
-    constrain,
 )
 from systems.bypass.distance_rate import distance_rate, outer_rate
 from systems.bypass.obstacle_tools import Margins
+from systems.bypass.safe_velocity import constrain
 from systems.bypass.shadow_body import ObstacleTool, pose_distance, read_tool
 from systems.bypass.workspace import WorkspaceParams
 from systems.common import geometry
