@@ -10,7 +10,7 @@ from plants.organs.distance import Organs
 from plants.organs.organs import OrganSet, arrays, port
 from systems.bypass import obstacle_tools as tools_around
 from systems.bypass import workspace as limits
-from systems.bypass.hidden_tool import must_withdraw, were_seen
+from systems.bypass.hidden_tool import were_seen, withdrawal
 from systems.bypass.obstacle_tools import Margins, obstacle_tools
 from systems.bypass.safe_velocity import constrain
 from systems.bypass.trocar_drift import trocar_drift
@@ -128,12 +128,13 @@ def hold(
         return np.zeros(len(known)), Velocity(v), CALM
     g, s = robot.fulcrum, guide.s
     tools = obstacle_tools(margins, g, obstacles, target, camera)
-    withdraws = params.active and params.dodge
-    withdraws = withdraws and must_withdraw(params, g, robot.tip, tools, obstacles)
+    withdraws = 0.0
+    if params.active and params.dodge:
+        withdraws = withdrawal(params, workspace, g, robot.tip, tools, obstacles)
     if not all_usable(obstacles):
-        if not withdraws:
+        if withdraws == 0.0:
             return np.zeros(len(known)), Velocity(v), CALM
-        out = scaled(-s * params.max_speed, unit(sub(robot.tip, g)))
+        out = scaled(-s * withdraws, unit(sub(robot.tip, g)))
         return np.zeros(len(known)), Velocity(out), _WITHDRAWS
     count = len(known) // (1 + _TROCAR)
     after = known.copy()

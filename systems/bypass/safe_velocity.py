@@ -77,7 +77,7 @@ def constrain(
     dodging: np.ndarray,
     drift: np.ndarray,
     organs: Organs | None = None,
-    withdraws: bool = False,
+    withdraws: float = 0.0,
 ) -> tuple[Vector, np.ndarray, ClearanceStatus]:
     """One step: the tip's velocity nearest to the wanted one that is safe.
 
@@ -92,7 +92,7 @@ def constrain(
         dodging: Whether R dodges each of them, 1 or 0; as many or more.
         drift: Velocities of R's trocar and of theirs, rows, m/s; one more.
         organs: What else to keep clear of; None is compiled away.
-        withdraws: Whether R dodges anyway.
+        withdraws: How fast R withdraws anyway, m/s.
 
     Returns:
         The tip's velocity in m/s, whether R dodges each tool, and the status.
@@ -102,7 +102,7 @@ def constrain(
     turning = fastest_sideways(workspace, q, params.turning_speed)
     dodges = np.zeros(len(dodging))
     least, is_near, holds, change, missed = 1e9, 0.0, 1.0, 0.0, 0.0
-    dodge = 1.0 if withdraws else 0.0
+    dodge, out = (1.0 if withdraws > 0.0 else 0.0), withdraws
     escape, blind, left = 0.0, 0.0, UNHINDERED
     e, _ = lateral_basis(u)
     near = params.obstacle_speed / params.rate
@@ -143,6 +143,7 @@ def constrain(
             driven_time(rate, inwards[:VIEW], room[:VIEW]),
         ):
             dodge = dodges[i] = 1.0
+            out = params.max_speed
         left = less(left, leeway(params, rate, tool.safe, e))
         set_row(rows, last, rate.A)
         bounds[last] = least_rate(params, rate, tool.safe, evasion)
@@ -168,7 +169,7 @@ def constrain(
                 bounds[last] = least_rate(params, end, tool.safe, evasion)
                 last += 1
     if dodge > 0.5:
-        wanted = scaled(-params.max_speed, u)
+        wanted = scaled(-out, u)
     if params.active:
         hurried = most_missed(wanted, rows[:last], bounds[:last])
         if dodge > 0.5 or hurried > _MISSED:
