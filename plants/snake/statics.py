@@ -199,7 +199,7 @@ def slid(
     s: Any,
     grip: Grip,
     most: int,
-) -> tuple[Any, Forces, float, int, bool, bool, float]:
+) -> tuple[Any, Forces, Any, int, bool, bool, float]:
     """The equilibrium after a step in which wires and sockets may slide.
 
     Args:
@@ -213,14 +213,14 @@ def slid(
         most: Iterations.
 
     Returns:
-        Turns, forces, the least eigenvalue of a further step's Hessian, iterations,
-        whether it is in balance, whether it left a state that it could not stay in,
-        and the heat in J.
+        Turns, forces, the Hessian of a further step, iterations, whether it is in
+        balance, whether it left a state that it could not stay in, and the heat in J.
     """
     now, total, lost = start, 0, False
+    at_once = AT_ONCE if s.wire + s.socket > 0.0 else most
     for _ in range(most + 1):
         now, to, count, done, left = settled(
-            now, pull, stiffness, wound, load, s, grip, min(AT_ONCE, most - total)
+            now, pull, stiffness, wound, load, s, grip, min(at_once, most - total)
         )
         total, lost = total + count, lost or left
         stuck = count == 0 and not done
@@ -230,10 +230,7 @@ def slid(
     n = 3 * MODULES if s.coupled else TURNS
     g, H = np.empty(n), np.empty((n, n))
     _reduced(to, s, g, H)
-    least = math.nan
-    if math.isfinite(np.abs(H).max()):
-        least = np.linalg.eigvalsh(H)[0]
-    return now, to, least, total, done, lost, heat
+    return now, to, H, total, done, lost, heat
 
 
 class Equilibrium(NamedTuple):
@@ -243,8 +240,7 @@ class Equilibrium(NamedTuple):
         turns: R_i of the six balls, (6, 3, 3).
         L: Lengths of the wires' paths in m, (9,).
         T: Tensions in N, (9,).
-        least_eigenvalue: Of the energy's Hessian in Nm/rad: not positive where it is
-            in balance and does not stay.
+        H: Hessian of the energy in Nm/rad, (n, n) of the freedoms that there are.
         iterations: That it took.
         converged: Whether it is in balance.
         buckled: Whether the way there left a state that it could not stay in.
@@ -256,13 +252,19 @@ class Equilibrium(NamedTuple):
     turns: Array
     L: Array
     T: Array
-    least_eigenvalue: float
+    H: Array
     iterations: int
     converged: bool
     buckled: bool
     heat: float
     P: Array
     grip: Grip
+
+    @property
+    def least_eigenvalue(self) -> float:
+        """Of H: not positive where the snake is in balance and does not stay."""
+        finite = np.isfinite(self.H).all()
+        return float(np.linalg.eigvalsh(self.H)[0]) if finite else math.nan
 
     @property
     def stable(self) -> bool:
@@ -365,11 +367,11 @@ class Statics:
         """
         args = self._arguments(tension, wound, force, moment)
         grip = grip_of(flat_grip(grip or self.at_rest(turns)))
-        now, to, least, count, done, buckled, heat = slid(
+        now, to, H, count, done, buckled, heat = slid(
             turns, *args, self.record[0], grip, MOST
         )
         return Equilibrium(
-            now, to.L, to.T, least, count, done, buckled, heat, to.P, grip
+            now, to.L, to.T, H, count, done, buckled, heat, to.P, grip
         )
 
     def _arguments(

@@ -114,24 +114,27 @@ def _core(Q: Any, s: Any, g: Any, H: Any) -> float:
     n2 = u * u + v * v
     angle = math.atan2(u, v)
     energy += 0.5 * s.twist * angle * angle
-    # Of a term P . Q c: c x r with r the row of Q that P picks.
+    # Of a term P . Q c: c x r with r the row of Q that P picks, and sym(r c^T) - r . c.
     gu = (-Q[0, 2], -Q[1, 2], v)
     gv = (Q[1, 2], -Q[0, 2], -u)
     gt = over(along(scaled(v, gu), -u, gv), n2)
+    by_u, by_v = s.twist * angle * v / n2, -s.twist * angle * u / n2
+    mixed, squared = -2 * u * v / n2**2, (u * u - v * v) / n2**2  # d/d(u, v) of that
     for i in range(3):
         g[i] += g1 * gc[i] + s.twist * angle * gt[i]
         for j in range(3):
-            hc = 0.5 * (Q[2, i] * (j == 2) + Q[2, j] * (i == 2)) - Q[2, 2] * (i == j)
-            hu = 0.5 * (Q[1, i] * (j == 0) + Q[1, j] * (i == 0)) - Q[1, 0] * (i == j)
-            hu -= 0.5 * (Q[0, i] * (j == 1) + Q[0, j] * (i == 1)) - Q[0, 1] * (i == j)
-            hv = 0.5 * (Q[0, i] * (j == 0) + Q[0, j] * (i == 0)) - Q[0, 0] * (i == j)
-            hv += 0.5 * (Q[1, i] * (j == 1) + Q[1, j] * (i == 1)) - Q[1, 1] * (i == j)
-            ht = (v * hu - u * hv) / n2
-            # d/d(u, v) of (v, -u)/n2
-            ht -= 2 * u * v / n2**2 * (gu[i] * gu[j] - gv[i] * gv[j])
-            ht -= (v * v - u * u) / n2**2 * (gu[i] * gv[j] + gv[i] * gu[j])
-            H[i, j] += g2 * gc[i] * gc[j] + g1 * hc
-            H[i, j] += s.twist * (gt[i] * gt[j] + angle * ht)
+            bowed = mixed * (gu[i] * gu[j] - gv[i] * gv[j])
+            bowed += squared * (gu[i] * gv[j] + gv[i] * gu[j])
+            H[i, j] += g2 * gc[i] * gc[j] + s.twist * (gt[i] * gt[j] + angle * bowed)
+        H[i, i] -= g1 * Q[2, 2] + by_u * u + by_v * v
+        row = (
+            0.5 * (by_u * Q[1, i] + by_v * Q[0, i]),
+            0.5 * (by_v * Q[1, i] - by_u * Q[0, i]),
+            0.5 * g1 * Q[2, i],
+        )
+        for k in range(3):
+            H[i, k] += row[k]
+            H[k, i] += row[k]
     return energy
 
 
@@ -205,13 +208,28 @@ def _held(w: int, T: float, paths: Any, s: Any, grip: Grip, to: Forces) -> float
         to.P[i, w] = T + 0.5 * change
         T += change
         energy += most * (abs(slip) - size + 0.5 * size * size / s.give)
-        if most > 0.0 and abs(slip) < s.give:
-            for a in range(3 * i, 3 * count):
-                ka = most / s.give * to.J[w, a] * (0.5 if a < 3 * i + 3 else 1.0)
-                for b in range(3 * i, 3 * count):
-                    share = 0.5 if b < 3 * i + 3 else 1.0
-                    to.H[a, b] += ka * share * to.J[w, b]
     return energy
+
+
+@compiled
+def _stiffened(w: int, stiffness: float, s: Any, grip: Grip, to: Forces) -> None:
+    """Adds a wire's stiffness to the Hessian's upper half: J^T C J.
+
+    The friction over ball i pulls at half of the path over it, and at all beyond.
+    """
+    count = 2 * (w // WIRES + 1)
+    J = to.J[w]
+    for i in range(count):
+        held = 0.0
+        if abs(to.slip[i, w]) < s.give:
+            held = grip.most[i, w] / s.give
+        for a in range(3 * i, 3 * i + 3):
+            near, far = (stiffness + 0.25 * held) * J[a], (stiffness + 0.5 * held) * J[a]
+            for b in range(a, 3 * i + 3):
+                to.H[a, b] += near * J[b]
+            for b in range(3 * i + 3, 3 * count):
+                to.H[a, b] += far * J[b]
+        stiffness += held
 
 
 @compiled
@@ -229,17 +247,15 @@ def _socket(i: int, Q: Any, s: Any, grip: Grip, to: Forces, g: Any, H: Any) -> f
     e = (to.strain[i, 0], to.strain[i, 1], to.strain[i, 2])
     size, give = norm(e), s.give / s.R
     stiff = grip.socket[i] / max(size, give)
+    slides = 1.0 / (size * size) if size > give else 0.0
+    y = np.empty(3)
     for a in range(3):
+        y[a] = G[0, a] * e[0] + G[1, a] * e[1] + G[2, a] * e[2]
+    for a in range(3):
+        g[a] += stiff * y[a]
         for b in range(3):
-            g[a] += stiff * G[b, a] * e[b]
-            total = 0.0
-            for k in range(3):
-                for n in range(3):
-                    K = 1.0 if k == n else 0.0
-                    if size > give:
-                        K -= e[k] * e[n] / (size * size)
-                    total += G[k, a] * K * G[n, b]
-            H[a, b] += stiff * total
+            square = G[0, a] * G[0, b] + G[1, a] * G[1, b] + G[2, a] * G[2, b]
+            H[a, b] += stiff * (square - slides * y[a] * y[b])
     held = min(size, give)
     return grip.socket[i] * (size - held + 0.5 * held * held / give)
 
@@ -312,11 +328,11 @@ def assembled(
         energy += _held(w, T, paths, s, grip, to)
         for a in range(count):
             to.g[a] += to.P[a // 3, w] * to.J[w, a]
-        if taut and T > 0.0 and stiffness > 0.0:
-            for a in range(count):
-                ka = stiffness * to.J[w, a]
-                for b in range(count):
-                    to.H[a, b] += ka * to.J[w, b]
+        pulls = taut and T > 0.0
+        _stiffened(w, stiffness if pulls else 0.0, s, grip, to)
+    for a in range(TURNS):
+        for b in range(a):
+            to.H[a, b] = to.H[b, a]
     for i in range(BALLS):
         H = to.H[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]
         for w in range(WIRES * (i // 2), ROPES):
