@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from plants.snake.parameters import MODULES, SnakeParams
 from plants.snake.posture import Array, bends_of, whole_postures
 from systems.common.compiled import compiled
-from systems.common.geometry import norm
+from systems.common.geometry import Vector, along, norm
 
 BALLS = 2 * MODULES
 TURNS = 3 * BALLS
@@ -55,24 +55,28 @@ def turns_of(x: ArrayLike) -> Array:
     return out
 
 
-def gaps(turns: Array) -> tuple[Array, Array]:
-    """What the paper takes to be zero, in rad.
+@compiled
+def gaps_of(turns: Any, split: Any, torsion: Any) -> None:
+    """What the paper takes to be zero, in rad, of R_i (6, 3, 3).
 
-    Args:
-        turns: R_i, (..., 6, 3, 3).
-
-    Returns:
-        Split of each module, between the bends of its two balls, (..., 3), and each
-        ball's torsion, (..., 6).
+    Into split (3,), between the bends of a module's balls, and each ball's torsion (6,).
     """
-    x, y, z = turns[..., 0, 2], turns[..., 1, 2], turns[..., 2, 2]
-    sine = np.hypot(x, y)
-    size = np.arctan2(sine, z) / np.where(sine > 0.0, sine, 1.0)
-    bend = np.stack([x, y], axis=-1) * size[..., None]
-    split = np.linalg.norm(bend[..., 0::2, :] - bend[..., 1::2, :], axis=-1)
-    torsion = np.arctan2(
-        turns[..., 1, 0] - turns[..., 0, 1], turns[..., 0, 0] + turns[..., 1, 1]
-    )
+    bend = np.empty((BALLS, 2))
+    for i in range(BALLS):
+        R = turns[i]
+        sine = math.hypot(R[0, 2], R[1, 2])
+        size = math.atan2(sine, R[2, 2]) / (sine if sine > 0.0 else 1.0)
+        bend[i, 0], bend[i, 1] = R[0, 2] * size, R[1, 2] * size
+        torsion[i] = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
+    for k in range(MODULES):
+        apart = bend[2 * k] - bend[2 * k + 1]
+        split[k] = math.hypot(apart[0], apart[1])
+
+
+def gaps(turns: Array) -> tuple[Array, Array]:
+    """Split of each module and torsion of each ball, as of `gaps_of`: (3,) and (6,)."""
+    split, torsion = np.empty(MODULES), np.empty(BALLS)
+    gaps_of(turns, split, torsion)
     return split, torsion
 
 
@@ -87,26 +91,52 @@ def tool_pose(turns: Array, s: float, params: SnakeParams) -> Array:
     return X
 
 
-def angles_of(turns: Array) -> Array:
+@compiled
+def tool_of(turns: Any, s: float, h: float, tool: float) -> tuple[Vector, Vector]:
+    """p_WT and the tool's axis n_WT of balls that turn by R_i (6, 3, 3)."""
+    A, B = np.eye(3), np.empty((3, 3))
+    p = (0.0, 0.0, s)
+    for i in range(BALLS):
+        times(A, turns[i], B)
+        A, B = B, A
+        p = along(p, 2 * h, (A[0, 2], A[1, 2], A[2, 2]))
+    n = (A[0, 2], A[1, 2], A[2, 2])
+    return along(p, tool, n), n
+
+
+@compiled
+def angles_of(turns: Any) -> Any:
     """Angles of joints Rx, Ry, Rz a ball in rad, (18,), that turn by R_i."""
-    a = np.arctan2(-turns[:, 1, 2], turns[:, 2, 2])
-    b = np.arcsin(np.clip(turns[:, 0, 2], -1.0, 1.0))
-    c = np.arctan2(-turns[:, 0, 1], turns[:, 0, 0])
-    return np.stack([a, b, c], axis=1).ravel()
+    angles = np.empty(TURNS)
+    for i in range(BALLS):
+        R = turns[i]
+        angles[3 * i] = math.atan2(-R[1, 2], R[2, 2])
+        angles[3 * i + 1] = math.asin(min(max(R[0, 2], -1.0), 1.0))
+        angles[3 * i + 2] = math.atan2(-R[0, 1], R[0, 0])
+    return angles
+
+
+@compiled
+def turned_to(angles: Any, out: Any) -> None:
+    """R_i of one set of the joints' angles (18,), into out (6, 3, 3)."""
+    for i in range(BALLS):
+        a, b, c = angles[3 * i], angles[3 * i + 1], angles[3 * i + 2]
+        ca, cb, cc = math.cos(a), math.cos(b), math.cos(c)
+        sa, sb, sc = math.sin(a), math.sin(b), math.sin(c)
+        R = out[i]
+        R[0, 0], R[0, 1], R[0, 2] = cb * cc, -cb * sc, sb
+        R[1, 0], R[1, 1] = sa * sb * cc + ca * sc, ca * cc - sa * sb * sc
+        R[2, 0], R[2, 1] = sa * sc - ca * sb * cc, ca * sb * sc + sa * cc
+        R[1, 2], R[2, 2] = -sa * cb, ca * cb
 
 
 def turns_of_angles(angles: ArrayLike) -> Array:
     """R_i (..., 6, 3, 3) of the joints' angles, (..., 18)."""
     q = np.asarray(angles, float)
-    q = q.reshape(*q.shape[:-1], BALLS, 3)
-    ca, cb, cc = np.moveaxis(np.cos(q), -1, 0)
-    sa, sb, sc = np.moveaxis(np.sin(q), -1, 0)
-    rows = [
-        [cb * cc, -cb * sc, sb],
-        [sa * sb * cc + ca * sc, ca * cc - sa * sb * sc, -sa * cb],
-        [sa * sc - ca * sb * cc, ca * sb * sc + sa * cc, ca * cb],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    out = np.empty((*q.shape[:-1], BALLS, 3, 3))
+    for one, turns in zip(q.reshape(-1, TURNS), out.reshape(-1, BALLS, 3, 3)):
+        turned_to(one, turns)
+    return out
 
 
 def corners_of(turns: Array, s: ArrayLike, params: SnakeParams) -> Array:

@@ -1,11 +1,15 @@
 """What holds the two balls of a module alike: an elastic core, nothing, or gears."""
 
 from dataclasses import dataclass
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.parameters import MODULES
 from plants.snake.posture import Array
+from systems.common.compiled import compiled
 from systems.common.parameter import parameter
 
 KINDS = ("none", "elastic", "coupled")
@@ -36,6 +40,20 @@ class SnakeCoreParams:
     )
 
 
+@compiled
+def core_torques(ab: Any, bend: float, tau: Any) -> None:
+    """As `torques_against_core`, added to tau (6,); `bend` is the core's, a ball."""
+    for k in range(MODULES):
+        ca, sa = math.cos(ab[2 * k]), math.sin(ab[2 * k])
+        cb, sb = math.cos(ab[2 * k + 1]), math.sin(ab[2 * k + 1])
+        sine = math.hypot(sb, sa * cb)
+        beta = math.atan2(sine, ca * cb)
+        # Both balls of a module, 1/2 bend beta^2 each, and cos(beta) = cos(a) cos(b).
+        torque = 2 * bend * beta / (sine if sine > 0.0 else 1.0)
+        tau[2 * k] += torque * sa * cb
+        tau[2 * k + 1] += torque * ca * sb
+
+
 def torques_against_core(ab: ArrayLike, core: SnakeCoreParams) -> Array:
     """Torques on (a1, b1, ..., b3) that bend the core as the paper's snake bends.
 
@@ -46,12 +64,7 @@ def torques_against_core(ab: ArrayLike, core: SnakeCoreParams) -> Array:
     Returns:
         tau in Nm, (6,), to be given to `tension.tensions`.
     """
-    a, b = np.asarray(ab, float).reshape(-1, 2).T
-    sine = np.hypot(np.sin(b), np.sin(a) * np.cos(b))
-    beta = np.arctan2(sine, np.cos(a) * np.cos(b))
-    # Both balls of a module, 1/2 bend beta^2 each, and cos(beta) = cos(a) cos(b).
+    tau = np.zeros(2 * MODULES)
     bend = core.bend if core.kind == "elastic" else 0.0
-    torque = 2 * bend * beta / np.where(sine > 0.0, sine, 1.0)
-    across = np.stack([np.sin(a) * np.cos(b), np.cos(a) * np.sin(b)], axis=1)
-    tau: Array = (torque[:, None] * across).ravel()
+    core_torques(np.asarray(ab, float), bend, tau)
     return tau

@@ -20,7 +20,6 @@ import numpy as np
 
 from plants.snake.balls import BALLS, TURNS, times
 from plants.snake.parameters import WIRES
-from plants.snake.posture import Array
 from plants.snake.statics_kernels import ROPES, Forces, Grip, sine_of
 from systems.common.compiled import compiled
 from systems.common.geometry import norm
@@ -108,15 +107,35 @@ def remembered(turns: Any, to: Forces, s: Any, grip: Grip) -> float:
 
 SHAPES = ((BALLS, 3, 3), (BALLS, ROPES), (BALLS, ROPES), (BALLS,), (BALLS, 3), (TURNS,))
 """Of a `Grip`'s parts."""
+GRIP = sum(map(math.prod, SHAPES))
+"""Numbers in a grip."""
 
 
-def flat_grip(grip: Grip) -> Array:
-    """A grip as a block keeps it."""
-    return np.concatenate([np.ravel(part) for part in grip])
+@compiled
+def flat_grip(grip: Grip) -> Any:
+    """A grip as a block keeps it, (204,)."""
+    return np.concatenate(
+        (
+            grip.turns.ravel(),
+            grip.most.ravel(),
+            grip.slip.ravel(),
+            grip.socket,
+            grip.strain.ravel(),
+            grip.step,
+        )
+    )
 
 
-def grip_of(values: Array) -> Grip:
-    """And back, as arrays of its own: (204,)."""
-    ends = np.cumsum([math.prod(shape) for shape in SHAPES])
-    parts = np.split(np.array(values), ends[:-1])
-    return Grip(*(part.reshape(s) for part, s in zip(parts, SHAPES, strict=True)))
+@compiled
+def grip_of(values: Any) -> Grip:
+    """And back, as arrays of its own."""
+    a, b = 9 * BALLS, BALLS * ROPES
+    c = a + 2 * b + BALLS
+    return Grip(
+        values[:a].copy().reshape((BALLS, 3, 3)),
+        values[a : a + b].copy().reshape((BALLS, ROPES)),
+        values[a + b : a + 2 * b].copy().reshape((BALLS, ROPES)),
+        values[a + 2 * b : c].copy(),
+        values[c : c + 3 * BALLS].copy().reshape((BALLS, 3)),
+        values[c + 3 * BALLS :].copy(),
+    )

@@ -7,11 +7,44 @@ A module turns about two ball centres, B1 and B2:
 It is regular where the paper's parameters are not, at beta = 0.
 """
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.kinematics import Array, centreline, frames
-from plants.snake.parameters import SnakeParams
+from plants.snake.kinematics import POINTS, Array, corners, turned
+from plants.snake.parameters import MODULES, SnakeParams
+from systems.common.compiled import compiled
+from systems.common.geometry import cross, plus
+
+
+@compiled
+def screws(x: Any, h: float, tool: float, J: Any) -> None:
+    """As `jacobian`, into J (6, 7); h is half the pitch, tool the tool's offset."""
+    c = np.empty((POINTS, 3))
+    corners(x, h, tool, c)
+    J[:] = 0.0
+    J[5, 0] = 1.0
+    e, f, n = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    for k in range(MODULES):
+        a, b = x[1 + 2 * k], x[2 + 2 * k]
+        before = e
+        f, n = turned(f, n, math.cos(a), math.sin(a))
+        e, n = turned(e, n, math.cos(2 * b), -math.sin(2 * b))
+        arms = (
+            (c[7, 0] - c[2 * k, 0], c[7, 1] - c[2 * k, 1], c[7, 2] - c[2 * k, 2]),
+            (
+                c[7, 0] - c[2 * k + 1, 0],
+                c[7, 1] - c[2 * k + 1, 1],
+                c[7, 2] - c[2 * k + 1, 2],
+            ),
+        )
+        for i, near, far in ((1 + 2 * k, before, e), (2 + 2 * k, f, f)):
+            w, v = plus(near, far), plus(cross(near, arms[0]), cross(far, arms[1]))
+            for r in range(3):
+                J[r, i], J[3 + r, i] = w[r], v[r]
+        f, n = turned(f, n, math.cos(a), math.sin(a))
 
 
 def jacobian(x: ArrayLike, params: SnakeParams) -> Array:
@@ -20,16 +53,6 @@ def jacobian(x: ArrayLike, params: SnakeParams) -> Array:
     Returns:
         J (6, 7): rows w_WT then v_WT in W, as Drake orders them.
     """
-    x = np.asarray(x, float)
-    points, chain = centreline(x, params), frames(x, params)
-    J = np.zeros((6, 7))
-    J[5, 0] = 1.0
-    for k in range(3):
-        a = x[1 + 2 * k]
-        y_between = chain[k][:3, :3] @ np.array([0.0, np.cos(a), np.sin(a)])
-        turns = ((chain[k][:3, 0], chain[k + 1][:3, 0]), (y_between, y_between))
-        for i, axes in enumerate(turns, 1 + 2 * k):
-            for axis, B in zip(axes, points[2 * k : 2 * k + 2], strict=True):
-                J[:3, i] += axis
-                J[3:, i] += np.cross(axis, points[7] - B)
+    J = np.empty((6, 7))
+    screws(np.asarray(x, float), params.half_pitch, params.tool_offset, J)
     return J

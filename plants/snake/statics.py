@@ -53,7 +53,7 @@ LONGEST = 0.3
 """Step of a ball in an iteration, in rad."""
 MOST = 60
 """Iterations."""
-AT_ONCE = 2
+AT_ONCE = 1
 """Iterations in which what friction can hold stays as it is."""
 BOUNDED = 1e-5
 """Change of what friction can hold at which a step is done, in N."""
@@ -233,6 +233,59 @@ def slid(
     return now, to, H, total, done, lost, heat
 
 
+@compiled
+def ahead(values: Any) -> Any:
+    """Where the balls of a flat grip will be if they turn as in the last step."""
+    grip = grip_of(values)
+    turns = np.empty_like(grip.turns)
+    turned_by(grip.turns, grip.step, turns)
+    return turns
+
+
+@compiled
+def followed(
+    values: Any, start: Any, stiffness: float, wound: Any, load: Any, s: Any
+) -> tuple[Any, Any]:
+    """As `held`, looked for from `start`: R_i and the flat grip alone."""
+    grip = grip_of(values)
+    none = np.zeros(ROPES)
+    now = slid(start, none, stiffness, wound, load, s, grip, MOST)[0]
+    return now, flat_grip(grip)
+
+
+@compiled
+def held(
+    values: Any, stiffness: float, wound: Any, load: Any, s: Any
+) -> tuple[Any, Any, Any, float, Any, bool]:
+    """A step of a snake that a flat grip holds, to what wires and load will be.
+
+    Args:
+        values: What friction holds on to, (204,).
+        stiffness: Of a wire in N/m.
+        wound: L_d in m, (9,).
+        load: Force and moment on the tool in W, (6,).
+        s: The snake, as `Statics` packs it.
+
+    Returns:
+        R_i (6, 3, 3), tensions (9,), P (6, 9), the least eigenvalue of a further
+        step's Hessian, the flat grip after it, and whether the posture is lost: out of
+        balance, unstable or buckled. What ends in no number leaves the snake where it
+        was.
+    """
+    grip, none = grip_of(values), np.zeros(ROPES)
+    before = grip.turns.copy()
+    now, to, H, _, done, left, _ = slid(
+        ahead(values), none, stiffness, wound, load, s, grip, MOST
+    )
+    after, least = flat_grip(grip), math.nan
+    if math.isfinite(np.abs(H).max()):
+        least = np.linalg.eigvalsh(H)[0]
+    lost = left or not done or not least > 0.0
+    if not math.isfinite(np.abs(after).max()):
+        return before, to.T, to.P, least, values.copy(), lost
+    return now, to.T, to.P, least, after, lost
+
+
 class Equilibrium(NamedTuple):
     """Where the snake stays, if it does.
 
@@ -346,8 +399,7 @@ class Statics:
 
     def ahead(self, grip: Grip) -> Array:
         """Where the balls will be if they turn as in the last step, (6, 3, 3)."""
-        turns = np.empty_like(grip.turns)
-        turned_by(grip.turns, grip.step, turns)
+        turns: Array = ahead(flat_grip(grip))
         return turns
 
     def equilibrium(

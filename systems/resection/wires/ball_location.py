@@ -1,16 +1,17 @@
 """Ball location: tool pose, mean posture and gaps from the turns of six balls."""
 
+import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.balls import BALLS, gaps, tool_pose, turns_of_angles
-from plants.snake.parameters import SnakeParams
-from plants.snake.posture import Array
+from plants.snake.balls import BALLS, gaps_of, tool_of, turned_to
+from plants.snake.parameters import MODULES, SnakeParams
 from plants.snake.signals import MODULE_NUMBERS, BallState, Numbers, ToolPose
-from systems.common.block import Block
+from systems.common.compiled import compiled, packed
 from systems.common.parameter import check
-from systems.common.signal import Field, flat, vector, view
+from systems.common.signal import Field
+from systems.common.step_block import StepBlock
 from systems.resection.wires.snake_location import Bends
 
 
@@ -51,7 +52,26 @@ class Gaps(NamedTuple):
     ]
 
 
-class BallLocation(Block):
+@compiled
+def _located(
+    c: Any, state: BallState
+) -> tuple[Bends, ToolPose, BallAngles, Gaps]:
+    """All of the outputs."""
+    turns, angles = np.empty((BALLS, 3, 3)), np.array(state.q[1:])
+    turned_to(angles, turns)
+    split, torsion = np.empty(MODULES), np.empty(BALLS)
+    gaps_of(turns, split, torsion)
+    bends: Any = np.empty(1 + 2 * MODULES)
+    bends[0] = state.q[0]
+    for k in range(MODULES):
+        axis = turns[2 * k, :, 2] + turns[2 * k + 1, :, 2]
+        bends[1 + 2 * k] = math.atan2(axis[1], axis[0])
+        bends[2 + 2 * k] = math.atan2(math.hypot(axis[0], axis[1]), axis[2])
+    p, n = tool_of(turns, state.q[0], c.half_pitch, c.tool_offset)
+    return Bends(bends), ToolPose(p, n), BallAngles(angles), Gaps(split, torsion)
+
+
+class BallLocation(StepBlock):
     """Where a snake of free balls truly is.
 
     Port ``state`` accepts the plant's `BallState`.
@@ -64,35 +84,21 @@ class BallLocation(Block):
     def __init__(self, snake: SnakeParams | None = None) -> None:
         """Makes the block."""
         super().__init__()
-        self._snake = check(snake or SnakeParams())
-        self._state = self.signal_in("state", BallState)
-        ticket = {self._state.ticket()}
-        self._turns = self.cached("turns", self._calc_turns, ticket)
-        known = {*ticket, self._turns.ticket()}
-        self.signal_out("bends", Bends, self._calc_bends, known)
-        self.signal_out("tool", ToolPose, self._calc_tool, known)
-        self.signal_out("balls", BallAngles, self._calc_balls, ticket)
-        self.signal_out("gaps", Gaps, self._calc_gaps, known)
-
-    def _calc_turns(self, context: Any) -> Array:
-        return turns_of_angles(view(BallState, self._state.Eval(context)).q[1:])
-
-    def _calc_bends(self, context: Any) -> Array:
-        axes = self._turns.Eval(context)[:, :, 2]
-        mean = axes[0::2] + axes[1::2]
-        alpha = np.arctan2(mean[:, 1], mean[:, 0])
-        beta = np.arctan2(np.hypot(mean[:, 0], mean[:, 1]), mean[:, 2])
-        s = view(BallState, self._state.Eval(context)).q[0]
-        return np.append(s, np.column_stack([alpha, beta]))
-
-    def _calc_tool(self, context: Any) -> Array:
-        s = float(view(BallState, self._state.Eval(context)).q[0])
-        X_WT = tool_pose(self._turns.Eval(context), s, self._snake)
-        return flat(ToolPose(vector(X_WT[:3, 3]), vector(X_WT[:3, 2])))
-
-    def _calc_balls(self, context: Any) -> Array:
-        q: Array = view(BallState, self._state.Eval(context)).q
-        return q[1:]
-
-    def _calc_gaps(self, context: Any) -> Array:
-        return np.concatenate(gaps(self._turns.Eval(context)))
+        snake = check(snake or SnakeParams())
+        constants = packed(half_pitch=snake.half_pitch, tool_offset=snake.tool_offset)
+        outputs = {
+            "bends": Bends,
+            "tool": ToolPose,
+            "balls": BallAngles,
+            "gaps": Gaps,
+        }
+        run, tickets = self._runner(
+            _located,
+            [constants],
+            [],
+            {"state": BallState},
+            [*outputs.values()],
+            False,
+            {},
+        )
+        self._emit(self.cached("located", run, tickets), outputs, 0)

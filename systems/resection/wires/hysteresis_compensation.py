@@ -7,37 +7,29 @@ model remembers what slid. What a tracker sees of the tool, less what the model 
 that instant, is its bias, which is low-passed and aimed off by.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.balls import tool_pose, turns_of
+from plants.snake.balls import tool_of, tool_pose, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.friction import (
-    SHAPES,
-    SnakeFrictionParams,
-    flat_grip,
-    grip_of,
-)
-from plants.snake.parameters import SnakeParams
-from plants.snake.posture import Array
+from plants.snake.friction import GRIP, SnakeFrictionParams, flat_grip
+from plants.snake.parameters import DRUMS, SnakeParams
 from plants.snake.signals import REST, Drums, Posture
-from plants.snake.statics import Statics
-from plants.snake.statics_kernels import Grip
+from plants.snake.statics import Statics, ahead, followed
 from plants.snake.tool_target import target_of
-from systems.common.block import Block
-from systems.common.compiled import compiled
+from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter, part
-from systems.common.signal import view
+from systems.common.signal import example
+from systems.common.step_block import StepBlock
 from systems.resection.wires.tool_tracker import TrackedTool
 from systems.resection.wires.wire_inverse_actuation import (
     WireInverseActuationParams,
-    winding,
+    stretched,
+    winder,
 )
 
 LEVER = 5e-3
@@ -46,6 +38,8 @@ SCALE = np.array([0.03, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 """Of a posture's parts against each other, m and rad."""
 DAMPING = 3e-4
 """Of the step, in m/rad: singular directions are left alone."""
+TINY = 1e-7
+"""Of a posture, by which the tool's pose is differentiated."""
 MOST = np.array([0.01, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35])
 """By which a posture is moved at most."""
 SLOW = 1e-3
@@ -78,64 +72,103 @@ class HysteresisCompensationParams:
 
 
 @compiled
-def _poses(x: Any, h: float, tool: float, step: float, J: Any) -> Array:
-    """The tool's place and axis (6) of a posture, and J (6, 7) by differences."""
-    rows = np.empty((8, 6))
-    for i in range(8):
-        y = x.copy()
-        if i < 7:
-            y[i] += step
-        at = target_of(y, h, tool)
-        for k in range(3):
-            rows[i, k], rows[i, 3 + k] = at.p[k], at.n[k]
+def _pose(x: np.ndarray, h: float, tool: float) -> np.ndarray:
+    """The tool's place and axis (6,) of the paper's snake in a posture."""
+    at = target_of(x, h, tool)
+    return np.array((*at.p, *at.n))
+
+
+@compiled
+def aimed(x: np.ndarray, off: np.ndarray, h: float, tool: float) -> np.ndarray:
+    """By how much to move a posture (7) so that the tool's pose moves by `off` (6).
+
+    h is half the pitch, tool the tool's offset, in m.
+    """
+    A, here, y = np.empty((6, 7)), _pose(x, h, tool), x.copy()
     for i in range(7):
-        J[:, i] = (rows[i] - rows[7]) / step
-    return rows[7]
+        y[i] += TINY
+        column = (_pose(y, h, tool) - here) / TINY * SCALE[i]
+        A[:3, i], A[3:, i] = column[:3], LEVER * column[3:]
+        y[i] = x[i]
+    goal = off.copy()
+    goal[3:] *= LEVER
+    return SCALE * (A.T @ np.linalg.solve(A @ A.T + DAMPING**2 * np.eye(6), goal))
 
 
-def aimed(x: Array, off: Array, snake: SnakeParams) -> Array:
-    """By how much to move a posture (7) so that the tool's pose moves by `off` (6)."""
-    J, weight = np.empty((6, 7)), np.repeat([1.0, LEVER], 3)
-    _poses(x, snake.half_pitch, snake.tool_offset, 1e-7, J)
-    A = weight[:, None] * J * SCALE
-    solved = np.linalg.solve(A @ A.T + DAMPING**2 * np.eye(6), weight * off)
-    step: Array = SCALE * (A.T @ solved)
-    return step
-
-
+@compiled
 def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
     """The model's force in N against a way (3,) in m that took some time in s."""
-    speed = np.linalg.norm(moved) / time
-    against: np.ndarray = -force / max(speed, SLOW) * moved / time
-    return against
+    speed = np.sqrt((moved * moved).sum()) / time
+    return -force / max(speed, SLOW) * moved / time
 
 
-class Compensation(NamedTuple):
-    """What is remembered from one period to the next.
-
-    Attributes:
-        grip: What the model's friction holds on to, flat, (204,).
-        x: The last posture asked for, (7,).
-        shift: What it is wound for besides, (7,).
-        bias: By which the tool is off the model, place and axis, (6,).
-        said: The model's tool, of this instant and those before, (FRAMES, 6).
-    """
-
-    grip: Array
-    x: Array
-    shift: Array
-    bias: Array
-    said: Array
+PARTS = np.cumsum(np.array([GRIP, 7, 7, 6]))
+"""Where in the state the parts after the first begin: what the model's friction holds on
+to, flat (204,); the last posture asked for (7,); what it is wound for besides (7,); by
+which the tool is off the model, place and axis (6,); and the model's tool, of this
+instant and those before (FRAMES, 6)."""
 
 
-PARTS = np.cumsum([sum(map(math.prod, SHAPES)), 7, 7, 6])
-"""Where in the state a `Compensation`'s parts begin, but the first."""
+@compiled
+def _biased(
+    c: Any, bias: np.ndarray, said: np.ndarray, time: float, frame: TrackedTool
+) -> np.ndarray:
+    """The bias (6,) with a frame that has come meanwhile."""
+    age = (time - frame.time) / c.period
+    seen = np.array((*frame.p, *frame.n))
+    if not (0.0 <= frame.time and age <= FRAMES - 0.5 and np.isfinite(seen).all()):
+        return bias
+    k = 6 * max(round(age), 0)
+    share = 1.0 - np.exp(-c.period / c.time_constant)
+    return bias + share * (seen - said[k : k + 6] - bias)
 
 
-class HysteresisCompensation(Block):
+@compiled
+def _step(
+    c: Any,
+    wound: Any,
+    snake: Any,
+    last: np.ndarray,
+    time: float,
+    posture: Posture,
+    frame: TrackedTool,
+) -> tuple[np.ndarray, Drums]:
+    """The next state, and the drums."""
+    i, j, k, n = PARTS
+    grip, before, shift, said = last[:i], last[i:j], last[j:k], last[n:]
+    bias, x = _biased(c, last[k:n], said, time, frame), np.array(posture.x)
+    x = x if np.isfinite(x).all() else before
+    h, tool = c.half_pitch, c.tool_offset
+    wanted = _pose(x, h, tool)
+    moved = wanted[:3] - _pose(before, h, tool)[:3]
+    force = opposing(c.cutting, moved, c.period)
+    load = np.append(force, np.zeros(3))
+    shaken = c.dither * (1.0 if round(time / c.period) % 2 == 0 else -1.0)
+    start = ahead(grip)
+    tip, after = np.zeros(6), grip
+    drums = np.zeros(DRUMS)
+    for _ in range(int(c.steps)):
+        drums = stretched(wound, x + shift, force)
+        drums[: DRUMS - 1] += shaken
+        start, after = followed(
+            grip, start, wound.stiffness, drums[: DRUMS - 1], load, snake
+        )
+        p, axis = tool_of(start, x[0] + shift[0], h, tool)
+        tip = np.array((*p, *axis))
+        step = aimed(x + shift, wanted - bias - tip, h, tool)
+        shift = np.minimum(np.maximum(shift + step, -MOST), MOST)
+    state = np.concatenate((after, x, shift, bias, tip, said[:-6]))
+    if not np.isfinite(state).all():
+        state = last.copy()
+        drums = stretched(wound, before + last[j:k], np.zeros(3))
+    wires: Any = drums[: DRUMS - 1]
+    return state, Drums(wires, drums[DRUMS - 1])
+
+
+class HysteresisCompensation(StepBlock):
     """Drums for a posture of a snake with friction, an elastic core and a load.
 
-    It stands in place of `WireInverseActuation`, of which it winds by `winding`. A
+    It stands in place of `WireInverseActuation`, of which it winds by `stretched`. A
     posture that is no numbers is taken for the last one.
 
     Port ``posture`` accepts the `Posture`.
@@ -154,80 +187,26 @@ class HysteresisCompensation(Block):
     ) -> None:
         """Makes the block for a snake, its drive and core, starting at a posture."""
         super().__init__()
-        self._params = check(params or HysteresisCompensationParams())
-        self._snake = check(snake or SnakeParams())
-        drive, core = check(drive or SnakeDriveParams()), core or SnakeCoreParams()
+        params = check(params or HysteresisCompensationParams())
+        snake, drive = check(snake or SnakeParams()), check(drive or SnakeDriveParams())
+        core = core or SnakeCoreParams()
         stiff = replace(
             wound or WireInverseActuationParams(), stiffness=drive.wire_stiffness
         )
-        self._wound: Callable[..., Array]
-        self._wound = winding(check(stiff), self._snake, drive, core)
-        self._model = Statics(self._snake, drive, core, friction=self._params.friction)
-        self._posture = self.signal_in("posture", Posture)
-        self._measured = self.signal_in("measured", TrackedTool)
+        model = Statics(snake, drive, core, friction=params.friction)
+        constants = packed(
+            params, half_pitch=snake.half_pitch, tool_offset=snake.tool_offset
+        )
         x = np.array(posture, float)
-        grip = self._model.at_rest(turns_of(x))
-        said = np.tile(self._pose(grip.turns, x[0]), (FRAMES, 1))
-        start = Compensation(flat_grip(grip), x, np.zeros(7), np.zeros(6), said)
-        self.DeclareDiscreteState(np.concatenate([np.ravel(part) for part in start]))
-        tickets = {
-            self._posture.ticket(),
-            self._measured.ticket(),
-            self.xd_ticket(),
-            self.time_ticket(),
-        }
-        self._next = self.cached("next", self._calc_next, tickets)
-        self.signal_out("drums", Drums, self._calc_drums, {self._next.ticket()})
-        self.update_every(self._params.period, lambda c: self._next.Eval(c)[0])
-
-    def _pose(self, turns: Array, s: float) -> Array:
-        X_WT = tool_pose(turns, s, self._snake)
-        return np.append(X_WT[:3, 3], X_WT[:3, 2])
-
-    def _calc_drums(self, context: Any) -> Array:
-        drums: Array = self._next.Eval(context)[1]
-        return drums
-
-    def _bias(self, context: Any, state: Compensation) -> Array:
-        """The bias with a frame that has come meanwhile."""
-        if not self._measured.HasValue(context):
-            return state.bias
-        values = self._measured.Eval(context)
-        frame = view(TrackedTool, values)
-        seen = np.append(frame.p, frame.n)
-        age = (context.get_time() - frame.time) / self._params.period
-        if frame.time < 0.0 or not np.isfinite(values).all() or age > FRAMES - 0.5:
-            return state.bias
-        share = 1.0 - np.exp(-self._params.period / self._params.time_constant)
-        off: Array = seen - state.said[max(round(age), 0)] - state.bias
-        return state.bias + share * off
-
-    def _calc_next(self, context: Any) -> tuple[Array, Array]:
-        """The next state, and the drums."""
-        p, values = self._params, np.array(context.get_discrete_state(0).value())
-        grip_, x_, shift_, bias_, said_ = np.split(values, PARTS)
-        state = Compensation(grip_, x_, shift_, bias_, said_.reshape(FRAMES, 6))
-        x = np.array(self._posture.Eval(context))
-        x = x if np.isfinite(x).all() else state.x
-        grip: Grip = grip_of(state.grip)
-        bias, shift = self._bias(context, state), state.shift
-        unused = np.empty((6, 7))
-        h, tool = self._snake.half_pitch, self._snake.tool_offset
-        wanted, last = (_poses(y, h, tool, 1e-7, unused) for y in (x, state.x))
-        force = opposing(p.cutting, wanted[:3] - last[:3], p.period)
-        turns = self._model.ahead(grip)
-        shaken = p.dither * (-1.0) ** round(context.get_time() / p.period)
-        for _ in range(p.steps):
-            drums = self._wound(x + shift, force)
-            wound = view(Drums, drums).wires
-            wound += shaken
-            found = self._model.equilibrium(turns, wound=wound, force=force, grip=grip)
-            turns = found.turns
-            said = self._pose(found.turns, x[0] + shift[0])
-            step = aimed(x + shift, wanted - bias - said, self._snake)
-            shift = np.clip(shift + step, -MOST, MOST)
-        if not np.isfinite(flat_grip(found.grip)).all():
-            return values, self._wound(state.x + state.shift)
-        memory = np.vstack([said, state.said[:-1]])
-        after = Compensation(flat_grip(found.grip), x, shift, bias, memory)
-        return np.concatenate([np.ravel(part) for part in after]), drums
+        grip = model.at_rest(turns_of(x))
+        X_WT = tool_pose(grip.turns, x[0], snake)
+        said = np.tile(np.append(X_WT[:3, 3], X_WT[:3, 2]), FRAMES)
+        self.declare_step(
+            _step,
+            [constants, winder(check(stiff), snake, drive, core), model.record],
+            {"posture": Posture, "measured": TrackedTool},
+            np.concatenate([flat_grip(grip), x, np.zeros(7 + 6), said]),
+            {"drums": Drums},
+            params.period,
+            defaults={"measured": example(TrackedTool)},
+        )

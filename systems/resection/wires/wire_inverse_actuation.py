@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.actuation import lengths, norm_rows, wire_lengths
-from plants.snake.core import SnakeCoreParams, torques_against_core
+from plants.snake.actuation import lengths, norm_rows
+from plants.snake.core import SnakeCoreParams, core_torques
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.parameters import SnakeParams
+from plants.snake.jacobian import screws
+from plants.snake.parameters import MODULES, SnakeParams
 from plants.snake.signals import REST, Drums, Posture
-from plants.snake.tension import tensions, torques_against
-from plants.snake.weight import GRAVITY, torques_of_weight, weight, whole_mass
+from plants.snake.tension import tensions_of
+from plants.snake.weight import GRAVITY, torques_of_weight, whole_mass
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import all_finite
@@ -64,41 +65,69 @@ def _wound(constants: np.ndarray, x: np.ndarray) -> np.ndarray:
     return wound
 
 
+@compiled
+def stretched(c: Any, x: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Drum positions (10,) of wires that stretch, and hold a force on the tool (3,)."""
+    h, tool, R, e = c.half_pitch, c.tool_offset, c.ball_radius, c.plate_thickness
+    n = len(c.rows)
+    ab, tau, J, T = x[1:], np.zeros(2 * MODULES), np.empty((6, 7)), np.empty(n)
+    core_torques(ab, c.bend, tau)
+    masses = (c.ball_mass, c.plate_mass, c.tool_mass)
+    tau -= torques_of_weight(x, h, tool, *masses, c.gravity)
+    screws(x, h, tool, J)
+    for i in range(2 * MODULES):
+        for k in range(3):
+            tau[i] -= J[3 + k, 1 + i] * force[k]
+    tensions_of(ab, tau, c.rows, R, h, e, c.least_tension, T)
+    L, wound = np.empty((1, n)), np.empty(n + 1)
+    lengths(x.reshape((1, 7)), c.rows, R, e, h, L)
+    wound[:n], wound[n] = L[0] - T / c.stiffness, x[0] - c.load / c.travel_kp
+    return wound
+
+
+@compiled
+def _stretched(constants: np.ndarray, x: np.ndarray, force: np.ndarray) -> np.ndarray:
+    wound: np.ndarray = stretched(constants[0], x, force)
+    return wound
+
+
+def winder(
+    params: WireInverseActuationParams,
+    snake: SnakeParams,
+    drive: SnakeDriveParams,
+    core: SnakeCoreParams = PAPERS,
+) -> np.ndarray:
+    """What `_wound` and `stretched` need to know, packed."""
+    return packed(
+        drive,
+        rows=norm_rows(snake),
+        load=whole_mass(drive) * params.gravity[2],
+        gravity=np.array(params.gravity, float),
+        half_pitch=snake.half_pitch,
+        tool_offset=snake.tool_offset,
+        ball_radius=snake.ball_radius,
+        plate_thickness=snake.plate_thickness,
+        bend=core.bend if core.kind == "elastic" else 0.0,
+        least_tension=params.least_tension,
+        stiffness=params.stiffness,
+    )
+
+
 def winding(
     params: WireInverseActuationParams,
     snake: SnakeParams,
     drive: SnakeDriveParams,
     core: SnakeCoreParams = PAPERS,
-) -> Callable[..., np.ndarray]:
+) -> Callable[[np.ndarray], np.ndarray]:
     """The map of a posture x (7) to drums (10): wires 0 to 8 and the translation [m].
 
     They hold the snake's weight as well, and bend its core: what gives way under it,
-    wires or servos, is wound shorter by as much. Wires that stretch hold a force on the
-    tool, too, the map's second argument (3,).
+    wires or servos, is wound shorter by as much.
     """
+    c, free = winder(params, snake, drive, core), np.zeros(3)
     if params.stiffness == 0.0:
-        c = packed(
-            drive,
-            rows=norm_rows(snake),
-            load=whole_mass(drive) * params.gravity[2],
-            gravity=np.array(params.gravity, float),
-            half_pitch=snake.half_pitch,
-            tool_offset=snake.tool_offset,
-            ball_radius=snake.ball_radius,
-            plate_thickness=snake.plate_thickness,
-        )
         return lambda x: _wound(c, x)
-
-    def stretched(x: np.ndarray, force: np.ndarray | None = None) -> np.ndarray:
-        load = weight(x, snake, drive, params.gravity)
-        tau = torques_against_core(x[1:], core) - load[1:]
-        if force is not None and force.any():
-            tau += torques_against(x, force, snake)
-        T = tensions(x[1:], tau, snake, params.least_tension)
-        s = x[0] - load[0] / drive.travel_kp
-        return np.append(wire_lengths(x, snake) - T / params.stiffness, s)
-
-    return stretched
+    return lambda x: _stretched(c, x, free)
 
 
 def wound_lengths(

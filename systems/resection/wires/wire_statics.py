@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import angles_of, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.friction import SnakeFrictionParams, flat_grip, grip_of
+from plants.snake.friction import SnakeFrictionParams, flat_grip
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import (
     REST,
@@ -20,9 +20,10 @@ from plants.snake.signals import (
     ToolForce,
 )
 from plants.snake.snake import BALL_POSITIONS
-from plants.snake.statics import Equilibrium, Statics
-from systems.common.block import Block
-from systems.common.signal import Field, flat, view
+from plants.snake.statics import Statics, held
+from systems.common.compiled import compiled, packed
+from systems.common.signal import Field
+from systems.common.step_block import StepBlock
 
 NOWHERE = (0.0,) * BALL_POSITIONS
 
@@ -34,7 +35,27 @@ class BallSetPoint(NamedTuple):
     v: Annotated[Numbers, Field("m/s, rad/s", "their rates, always zero", NOWHERE)]
 
 
-class WireStatics(Block):
+@compiled
+def _step(
+    c: Any, snake: Any, last: np.ndarray, drums: Drums, rates: DrumRates, on: ToolForce
+) -> tuple[np.ndarray, BallSetPoint, Tensions, Stability]:
+    """The equilibrium a lead later, downhill from that of the last update."""
+    wound = np.array(drums.wires) + c.lead * np.array(rates.wires)
+    if not np.isfinite(wound).all():  # infinitely long is not slack
+        wound[:] = np.nan
+    load = np.array((on.f[0], on.f[1], on.f[2], 0.0, 0.0, 0.0))
+    turns, T, _, least, after, lost = held(last[:-1], c.stiffness, wound, load, snake)
+    s = drums.s + c.travel_lead * rates.s
+    s = s if np.isfinite(s) else last[-1]
+    x: Any = np.append(np.array([s]), angles_of(turns))
+    still: Any = np.zeros(len(x))
+    state = np.append(after, np.array([s]))
+    stability = Stability(least, 1.0 if lost else 0.0)
+    tension: Any = T
+    return state, BallSetPoint(x, still), Tensions(tension), stability
+
+
+class WireStatics(StepBlock):
     """Angles of six balls from wire lengths and the force on the tool.
 
     The snake is light and its motion slow: it is where its energy is least, downhill
@@ -69,60 +90,25 @@ class WireStatics(Block):
             friction: Of wires and sockets, which are at rest at first.
         """
         super().__init__()
-        self._statics = Statics(snake, drive, core, friction=friction)
-        lag = self._statics.drive
-        self._lead, self._travel_lead = lag.lead + period, lag.travel_lead + period
-        self._lengths = self.signal_in("lengths", Drums)
-        self._rates = self.signal_in("rates", DrumRates)
-        self._force = self.signal_in("force", ToolForce)
+        statics = Statics(snake, drive, core, friction=friction)
+        lag = statics.drive
+        constants = packed(
+            lead=lag.lead + period,
+            travel_lead=lag.travel_lead + period,
+            stiffness=lag.wire_stiffness,
+        )
         # What friction holds on to, R_i among it, and s at the last update.
-        start = flat_grip(self._statics.at_rest(turns_of(posture)))
-        self.DeclareDiscreteState(np.append(start, np.asarray(posture, float)[0]))
-        ports = {port.ticket() for port in (self._lengths, self._rates, self._force)}
-        self._found = self.cached("found", self._calc_found, ports | {self.xd_ticket()})
-        found = {self._found.ticket()}
-        self.signal_out(
-            "desired_state", BallSetPoint, self._calc_desired, ports | found
+        start = flat_grip(statics.at_rest(turns_of(posture)))
+        self.declare_step(
+            _step,
+            [constants, statics.record],
+            {"lengths": Drums, "rates": DrumRates, "force": ToolForce},
+            np.append(start, np.asarray(posture, float)[0]),
+            {
+                "desired_state": BallSetPoint,
+                "tension": Tensions,
+                "stability": Stability,
+            },
+            period,
+            timed=False,
         )
-        self.signal_out("tension", Tensions, self._calc_tension, found)
-        self.signal_out("stability", Stability, self._calc_stability, found)
-        self.update_every(period, self._calc_next)
-
-    def _calc_found(self, context: Any) -> Equilibrium:
-        """The equilibrium a lead later, downhill from that of the last update."""
-        drums = view(Drums, self._lengths.Eval(context))
-        rates = view(DrumRates, self._rates.Eval(context))
-        last = grip_of(context.get_discrete_state(0).value()[:-1])
-        wound = drums.wires + self._lead * rates.wires
-        if not np.isfinite(wound).all():  # infinitely long is not slack
-            wound = np.full_like(wound, np.nan)
-        force = self._force.Eval(context)
-        found = self._statics.equilibrium(
-            self._statics.ahead(last), wound=wound, force=force, grip=last
-        )
-        # Out of balance it falls downhill, as far as the search goes.
-        if np.isfinite(flat_grip(found.grip)).all():
-            return found
-        return found._replace(turns=last.turns, grip=last)
-
-    def _calc_s(self, context: Any) -> float:
-        drums = view(Drums, self._lengths.Eval(context))
-        rates = view(DrumRates, self._rates.Eval(context))
-        s = float(drums.s + self._travel_lead * rates.s)
-        return s if np.isfinite(s) else float(context.get_discrete_state(0).value()[-1])
-
-    def _calc_next(self, context: Any) -> np.ndarray:
-        grip = flat_grip(self._found.Eval(context).grip)
-        return np.append(grip, self._calc_s(context))
-
-    def _calc_desired(self, context: Any) -> np.ndarray:
-        angles = angles_of(self._found.Eval(context).turns)
-        return flat(BallSetPoint((self._calc_s(context), *angles), NOWHERE))
-
-    def _calc_tension(self, context: Any) -> np.ndarray:
-        tension: np.ndarray = self._found.Eval(context).T
-        return tension
-
-    def _calc_stability(self, context: Any) -> list[float]:
-        found = self._found.Eval(context)
-        return [found.least_eigenvalue, float(found.buckled or not found.stable)]
