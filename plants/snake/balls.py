@@ -59,7 +59,7 @@ def turns_of(x: ArrayLike) -> Array:
 def gaps_of(turns: Any, split: Any, torsion: Any) -> None:
     """What the paper takes to be zero, in rad, of R_i (6, 3, 3).
 
-    Into split (3,), between the bends of a module's balls, and each ball's torsion (6,).
+    Into split (3,), between the bends of a module's balls, and torsion (6,) of a ball.
     """
     bend = np.empty((BALLS, 2))
     for i in range(BALLS):
@@ -134,7 +134,8 @@ def turns_of_angles(angles: ArrayLike) -> Array:
     """R_i (..., 6, 3, 3) of the joints' angles, (..., 18)."""
     q = np.asarray(angles, float)
     out = np.empty((*q.shape[:-1], BALLS, 3, 3))
-    for one, turns in zip(q.reshape(-1, TURNS), out.reshape(-1, BALLS, 3, 3)):
+    rows = q.reshape(-1, TURNS)
+    for one, turns in zip(rows, out.reshape(-1, BALLS, 3, 3), strict=True):
         turned_to(one, turns)
     return out
 

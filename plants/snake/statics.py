@@ -35,6 +35,7 @@ from plants.snake.friction import (
 )
 from plants.snake.parameters import MODULES, STOP, SnakeParams
 from plants.snake.posture import Array
+from plants.snake.sliding import quickly
 from plants.snake.statics_kernels import (
     ROPES,
     Forces,
@@ -55,6 +56,10 @@ MOST = 60
 """Iterations."""
 AT_ONCE = 1
 """Iterations in which what friction can hold stays as it is."""
+NEAR = 1e-9
+"""As `TOLERANCE`, of a step with friction: what `BOUNDED` leaves is 30 times that."""
+QUICK = 8
+"""Iterations in which a step is tried to be found at once (`sliding`)."""
 BOUNDED = 1e-5
 """Change of what friction can hold at which a step is done, in N."""
 RIGID = 1e3
@@ -216,8 +221,20 @@ def slid(
         Turns, forces, the Hessian of a further step, iterations, whether it is in
         balance, whether it left a state that it could not stay in, and the heat in J.
     """
+    n = 3 * MODULES if s.coupled else TURNS
+    g, H = np.empty(n), np.empty((n, n))
+    rough = s.wire + s.socket > 0.0
+    if rough and not s.coupled:
+        tried, to = grip_of(flat_grip(grip)), empty_forces()
+        now, total, done = quickly(
+            start, pull, stiffness, wound, load, s, tried, to, NEAR, QUICK
+        )
+        if done and _factored(to.H, 0.0, H):
+            grip.most[:], grip.socket[:] = tried.most, tried.socket
+            heat = remembered(now, to, s, grip)
+            return now, to, to.H, total, done, False, heat
     now, total, lost = start, 0, False
-    at_once = AT_ONCE if s.wire + s.socket > 0.0 else most
+    at_once = AT_ONCE if rough else most
     for _ in range(most + 1):
         now, to, count, done, left = settled(
             now, pull, stiffness, wound, load, s, grip, min(at_once, most - total)
@@ -227,8 +244,6 @@ def slid(
         if (bound(now, to, s, grip) < BOUNDED and done) or stuck or total >= most:
             break
     heat = remembered(now, to, s, grip)
-    n = 3 * MODULES if s.coupled else TURNS
-    g, H = np.empty(n), np.empty((n, n))
     _reduced(to, s, g, H)
     return now, to, H, total, done, lost, heat
 
@@ -422,9 +437,7 @@ class Statics:
         now, to, H, count, done, buckled, heat = slid(
             turns, *args, self.record[0], grip, MOST
         )
-        return Equilibrium(
-            now, to.L, to.T, H, count, done, buckled, heat, to.P, grip
-        )
+        return Equilibrium(now, to.L, to.T, H, count, done, buckled, heat, to.P, grip)
 
     def _arguments(
         self, tension: Any, wound: Any, force: Any, moment: Any

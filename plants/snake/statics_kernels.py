@@ -224,7 +224,10 @@ def _stiffened(w: int, stiffness: float, s: Any, grip: Grip, to: Forces) -> None
         if abs(to.slip[i, w]) < s.give:
             held = grip.most[i, w] / s.give
         for a in range(3 * i, 3 * i + 3):
-            near, far = (stiffness + 0.25 * held) * J[a], (stiffness + 0.5 * held) * J[a]
+            near, far = (
+                (stiffness + 0.25 * held) * J[a],
+                (stiffness + 0.5 * held) * J[a],
+            )
             for b in range(a, 3 * i + 3):
                 to.H[a, b] += near * J[b]
             for b in range(3 * i + 3, 3 * count):
@@ -258,6 +261,21 @@ def _socket(i: int, Q: Any, s: Any, grip: Grip, to: Forces, g: Any, H: Any) -> f
             H[a, b] += stiff * (square - slides * y[a] * y[b])
     held = min(size, give)
     return grip.socket[i] * (size - held + 0.5 * held * held / give)
+
+
+@compiled
+def sliding_axis(i: int, Q: Any, s: Any, grip: Grip, to: Forces) -> Vector:
+    """What a ball's socket exerts, by the largest torque that it can: (3,)."""
+    B, y = np.empty((3, 3)), np.empty(3)
+    times(grip.turns[i].T, Q, B)
+    trace = B[0, 0] + B[1, 1] + B[2, 2]
+    e = (to.strain[i, 0], to.strain[i, 1], to.strain[i, 2])
+    size = max(norm(e), s.give / s.R)
+    for a in range(3):
+        y[a] = 0.5 * trace * e[a]
+        for k in range(3):
+            y[a] -= 0.5 * B[a, k] * e[k]
+    return y[0] / size, y[1] / size, y[2] / size
 
 
 @compiled

@@ -53,13 +53,13 @@ class Gaps(NamedTuple):
 
 
 @compiled
-def _located(
-    c: Any, state: BallState
-) -> tuple[Bends, ToolPose, BallAngles, Gaps]:
+def _located(c: Any, state: BallState) -> tuple[Bends, ToolPose, BallAngles, Gaps]:
     """All of the outputs."""
-    turns, angles = np.empty((BALLS, 3, 3)), np.array(state.q[1:])
+    turns: Any = np.empty((BALLS, 3, 3))
+    angles: Any = np.array(state.q[1:])
     turned_to(angles, turns)
-    split, torsion = np.empty(MODULES), np.empty(BALLS)
+    split: Any = np.empty(MODULES)
+    torsion: Any = np.empty(BALLS)
     gaps_of(turns, split, torsion)
     bends: Any = np.empty(1 + 2 * MODULES)
     bends[0] = state.q[0]

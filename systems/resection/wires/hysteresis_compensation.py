@@ -103,9 +103,9 @@ def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
 
 
 PARTS = np.cumsum(np.array([GRIP, 7, 7, 6]))
-"""Where in the state the parts after the first begin: what the model's friction holds on
-to, flat (204,); the last posture asked for (7,); what it is wound for besides (7,); by
-which the tool is off the model, place and axis (6,); and the model's tool, of this
+"""Where in the state the parts after the first begin: what the model's friction holds
+on to, flat (204,); the last posture asked for (7,); what it is wound for besides (7,);
+by which the tool is off the model, place and axis (6,); and the model's tool, of this
 instant and those before (FRAMES, 6)."""
 
 
@@ -116,7 +116,7 @@ def _biased(
     """The bias (6,) with a frame that has come meanwhile."""
     age = (time - frame.time) / c.period
     seen = np.array((*frame.p, *frame.n))
-    if not (0.0 <= frame.time and age <= FRAMES - 0.5 and np.isfinite(seen).all()):
+    if not (frame.time >= 0.0 and age <= FRAMES - 0.5 and np.isfinite(seen).all()):
         return bias
     k = 6 * max(round(age), 0)
     share = 1.0 - np.exp(-c.period / c.time_constant)

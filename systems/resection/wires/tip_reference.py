@@ -14,7 +14,7 @@ from plants.snake.tool_target import target_of
 from systems.common.block import Block
 from systems.common.geometry import across, along, cross, plus, scaled, unit
 from systems.common.parameter import Rules, check, parameter, part
-from systems.common.signal import flat, vector
+from systems.common.signal import vector
 
 PLACE: dict[str, Any] = {"least": -0.5, "most": 0.5, "shape": (3,)}
 DIRECTION: dict[str, Any] = {"least": -1e3, "most": 1e3, "shape": (3,)}
@@ -201,8 +201,9 @@ class TipReference(Block):
 
     def _calc_target(self, context: Any) -> np.ndarray:
         time = context.get_time() + self._params.lead
-        return flat(reference(self._params, time, self._snake))
+        target = reference(self._params, time, self._snake)
+        return np.array((*target.p, *target.n, *target.n_I))
 
     def _calc_reference(self, context: Any) -> np.ndarray:
         target = reference(self._params, context.get_time(), self._snake)
-        return flat(ToolPose(target.p, target.n))
+        return np.array((*target.p, *target.n))

@@ -7,8 +7,8 @@ import numpy as np
 
 from plants.snake.signals import ToolForce, ToolPose
 from systems.common.block import Block
+from systems.common.compiled import compiled
 from systems.common.parameter import Rules, check, parameter
-from systems.common.signal import view
 
 
 @dataclass
@@ -40,6 +40,7 @@ class ToolLoadParams:
         yield self.start < self.end, "end", f"> start={self.start:g} s"
 
 
+@compiled
 def resisting(
     before: np.ndarray, moved: np.ndarray, stiffness: float, most: float
 ) -> np.ndarray:
@@ -54,8 +55,23 @@ def resisting(
         stiffness: Of tissue, in N/m.
         most: At which it gives way, in N.
     """
-    f: np.ndarray = before - stiffness * moved
-    return f * min(1.0, most / max(float(np.linalg.norm(f)), 1e-300))
+    f = before - stiffness * moved
+    return f * min(1.0, most / max(np.sqrt((f * f).sum()), 1e-300))
+
+
+@compiled
+def cut(
+    last: np.ndarray, tool: np.ndarray, stiffness: float, most: float
+) -> np.ndarray:
+    """Where the tool is, and what resists it, (6,), from a `ToolPose`'s elements.
+
+    A place that is no number leaves the last; before the first there is no motion.
+    """
+    p = tool[:3]
+    if not np.isfinite(p).all():
+        return last.copy()
+    moved = p - last[:3] if np.isfinite(last).all() else np.zeros(3)
+    return np.append(p, resisting(last[3:], moved, stiffness, most))
 
 
 class ToolLoad(Block):
@@ -70,6 +86,7 @@ class ToolLoad(Block):
         """Makes the block."""
         super().__init__()
         self._params = check(params or ToolLoadParams())
+        self._force = np.array(self._params.force)
         self._tool = self.signal_in("tool", ToolPose)
         # Where the tool was at the last update, and what opposed its motion.
         self.DeclareDiscreteState(np.append([np.nan] * 3, [0.0] * 3))
@@ -81,15 +98,11 @@ class ToolLoad(Block):
         last = context.get_discrete_state(0).value()
         if not self._tool.HasValue(context):
             return np.array(last)
-        p = np.array(view(ToolPose, self._tool.Eval(context)).p)
-        if not np.isfinite(p).all():
-            return np.array(last)
-        c = self._params
-        moved = p - last[:3] if np.isfinite(last).all() else np.zeros(3)
-        return np.append(p, resisting(last[3:], moved, c.tissue, c.cutting))
+        c, tool = self._params, self._tool.Eval(context)
+        return cut(last, tool, c.tissue, c.cutting)
 
     def _calc_force(self, context: Any) -> np.ndarray:
         p = self._params
         share = (context.get_time() - p.start) / (p.end - p.start)
-        grown: np.ndarray = np.clip(share, 0.0, 1.0) * np.array(p.force)
-        return grown + context.get_discrete_state(0).value()[3:]
+        f: np.ndarray = context.get_discrete_state(0).value()[3:]
+        return f + min(max(share, 0.0), 1.0) * self._force

@@ -76,7 +76,8 @@ def test_a_right_model_takes_the_error_away_and_tracking_helps_a_wrong_one():
 def test_a_posture_is_moved_as_far_as_the_tool_is_off():
     x = posture_of([0.01, 0.4, 0.3, -1.2, 0.3, 2.5, 0.3])
     off = np.array([1e-4, -5e-5, 8e-5, 0.0, 0.0, 0.0])
-    moved = forward(x + aimed(x, off, PARAMS.half_pitch, PARAMS.tool_offset), PARAMS) - forward(x, PARAMS)
+    step = aimed(x, off, PARAMS.half_pitch, PARAMS.tool_offset)
+    moved = forward(x + step, PARAMS) - forward(x, PARAMS)
     np.testing.assert_allclose(moved[:3, 3], off[:3], atol=3e-6)
 
 
