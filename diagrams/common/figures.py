@@ -121,6 +121,8 @@ FIGURES = {
     "buckled_at": Figure("s", "when the snake was noticed to be lost"),
     "min_tension": Figure("N", "least of any wire"),
     "max_tension": Figure("N", "greatest of any wire"),
+    "tension_inside": Figure("%", "share of tip tensions within their bounds"),
+    "tension_width": Figure("N", "between those bounds, median"),
     "break_detection_time": Figure("s", "from a wire's break to the alarm"),
     "false_alarms": Figure("", "alarms without a break"),
     "refused_poses": Figure("", "poses out of reach"),

@@ -25,6 +25,7 @@ from systems.resection.wires.ball_location import BallLocation
 from systems.resection.wires.hysteresis_compensation import HysteresisCompensation
 from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
+from systems.resection.wires.tension_estimator import TensionEstimator
 from systems.resection.wires.tip_reference import TipReference, reference
 from systems.resection.wires.tool_load import ToolLoad
 from systems.resection.wires.tool_tracker import PoseNoise, ToolTracker
@@ -81,6 +82,11 @@ STATICS_WIRES = (
     ("wire_statics.stability", "wire_watch.stability"),
 )
 
+ESTIMATOR_WIRES = (
+    ("wire_statics.tension", "tension_estimator.tension"),
+    ("resection_ik.posture", "tension_estimator.posture"),
+)
+
 TRACKER_WIRES = (
     ("snake_location.tool", "tool_tracker.tool"),
     ("tracker_noise.output", "tool_tracker.noise"),
@@ -118,6 +124,11 @@ EXPORTS_OF = {
         "wires.stability": "wire_statics.stability",
         "tool.force": "tool_load.force",
     },
+}
+
+ESTIMATOR_EXPORTS = {
+    "wires.tip_tension": "wire_statics.tip_tension",
+    "wires.interval": "tension_estimator.interval",
 }
 
 HAND = ("wires_outside.told", "wire_drums.command")
@@ -216,6 +227,10 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
             s.snake, s.drive, s.core, s.period, posture, s.friction
         ),
     }
+    if s.estimate:
+        blocks["tension_estimator"] = TensionEstimator(
+            replace(s.estimator, period=s.period), s.snake
+        )
     if s.compensation != "none":
         # In place of the paper's map from a posture to drums.
         blocks["wire_inverse_actuation"] = HysteresisCompensation(
@@ -269,6 +284,9 @@ def make_snake_diagram(
     made, wires = make_blocks(scenario), WIRES + WIRES_OF[scenario.wires]
     if scenario.compensation == "tracked":
         wires += TRACKER_WIRES
+    exports = EXPORTS | EXPORTS_OF[scenario.wires]
+    if scenario.estimate:
+        wires, exports = wires + ESTIMATOR_WIRES, exports | ESTIMATOR_EXPORTS
     if scenario.guided is not None:
         *lengths, s = start_lengths(scenario)
         rest = Drums(tuple(lengths), s)
@@ -277,5 +295,4 @@ def make_snake_diagram(
         wires = (*(wire for wire in wires if wire[1] != HAND[1]), HAND)
     blocks = add_blocks(builder, made, swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
-    exports = EXPORTS | EXPORTS_OF[scenario.wires]
     return finish(builder, "snake", systems, wires, exports, scenario.faults)

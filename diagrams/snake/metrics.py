@@ -57,6 +57,7 @@ def measure(run: Any) -> dict[str, Any]:
         "rms_pose_error": float(np.sqrt(np.mean(position**2))) if some else None,
         "max_axis_error": float(angle.max()) if some else None,
         **_balls(run, alarm, lost),
+        **_interval(run),
         "min_tension": float(tension.min()),
         "max_tension": float(tension.max()),
         "break_detection_time": alarm - snapped if found and snapped else None,
@@ -79,6 +80,18 @@ def _balls(run: Any, alarm: float, lost: bool) -> dict[str, Any]:
         "loop_width": loop_width(run),
         "buckled_at": alarm if lost else None,
         "stops": int(alarm >= 0.0),
+    }
+
+
+def _interval(run: Any) -> dict[str, Any]:
+    """How good the bounds of the tensions at the tips are."""
+    if not run.scenario.estimate:
+        return {}
+    tip, found = run.wires.tip_tension.T, run.wires.interval
+    inside = (found.lower - 1e-4 <= tip) & (tip <= found.upper + 1e-4)
+    return {
+        "tension_inside": float(inside.mean()),
+        "tension_width": float(np.median(found.upper - found.lower)),
     }
 
 

@@ -16,6 +16,7 @@ from systems.resection.wires.hysteresis_compensation import (
     HysteresisCompensationParams,
 )
 from systems.resection.wires.resection_ik import ResectionIkParams
+from systems.resection.wires.tension_estimator import TensionEstimatorParams
 from systems.resection.wires.tip_reference import TipReferenceParams, reference
 from systems.resection.wires.tool_load import ToolLoadParams
 from systems.resection.wires.tool_tracker import ToolTrackerParams
@@ -70,6 +71,10 @@ class SnakeScenario(Scenario):
     )
     hysteresis: HysteresisCompensationParams = part(HysteresisCompensationParams)
     tracker: ToolTrackerParams = part(ToolTrackerParams)
+    estimate: bool = parameter(
+        False, "whether bounds of the tensions at the tips are estimated"
+    )
+    estimator: TensionEstimatorParams = part(TensionEstimatorParams)
     load: ToolLoadParams = part(ToolLoadParams)
     watch: WireWatchParams = part(WireWatchParams)
 
@@ -84,6 +89,7 @@ class SnakeScenario(Scenario):
         yield free or smooth, "friction", f"none {told}, that know it"
         plain = self.compensation == "none"
         yield free or plain, "compensation", f"none {told}, that know friction"
+        yield free or not self.estimate, "estimate", f"none {told}, that know tips"
         for name, target in _targets(self.tip, self.snake):
             if not tool_postures(*target, self.snake).reached:
                 raise ScenarioError(f"{name}: {why_not(*target, self.snake)}")

@@ -19,6 +19,7 @@ from plants.snake.signals import Drums, Stability, Tensions, ToolForce, ToolPose
 from systems.resection.wires.ball_location import BallAngles, Gaps
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
+from systems.resection.wires.tension_estimator import TensionInterval
 from systems.resection.wires.wire_drums import Limited
 from systems.resection.wires.wire_forward_actuation import Residual
 from systems.resection.wires.wire_watch import Alarm
@@ -40,6 +41,10 @@ STATICS_SIGNALS = {
     "wires.stability": Stability,
     "tool.force": ToolForce,
 }
+ESTIMATOR_SIGNALS = {
+    "wires.tip_tension": Tensions,
+    "wires.interval": TensionInterval,
+}
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
 LOG_PERIOD = 0.02
@@ -55,7 +60,8 @@ def integrator(scenario: SnakeScenario) -> SimulatorConfig:
 def signals(scenario: SnakeScenario) -> dict[str, Any]:
     """What is logged of a scenario."""
     free = scenario.wires == "statics"
-    return SIGNALS | (STATICS_SIGNALS if free else PAPERS_SIGNALS)
+    known = SIGNALS | (STATICS_SIGNALS if free else PAPERS_SIGNALS)
+    return known | (ESTIMATOR_SIGNALS if scenario.estimate else {})
 
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:

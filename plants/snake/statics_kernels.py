@@ -94,6 +94,16 @@ def path_over(p: float, s: Any) -> tuple[float, float, float]:
 
 
 @compiled
+def chord(Q: Any, w: int, s: Any) -> float:
+    """||P P'|| of wire w across a ball that turns by Q."""
+    x, y, d = s.points[w, 0], s.points[w, 1], s.d
+    rc = (Q[0, 0] * x + Q[1, 0] * y - Q[2, 0] * d) * x
+    rc += (Q[0, 1] * x + Q[1, 1] * y - Q[2, 1] * d) * y
+    rc += (Q[0, 2] * x + Q[1, 2] * y - Q[2, 2] * d) * d
+    return math.sqrt(max(2 * (s.R * s.R + d * d - rc), 1e-12))
+
+
+@compiled
 def _core(Q: Any, s: Any, g: Any, H: Any) -> float:
     """Energy of one ball's core and rims; adds its derivatives to g and H."""
     # cos(beta) = z . Q z, and the twist's sine and cosine, u = Q_yx - Q_xy and

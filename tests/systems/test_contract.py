@@ -221,7 +221,7 @@ OBSERVE = {
     *("ToolWrench", "TrajectoryEstimator", "TubeLocation", "WireTension", "WireWatch"),
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
     *("NavigationMonitor", "TissueForce", "WallWrench"),
-    *("GuidedDisc", "SensorZeroing", "ToolTracker"),
+    *("GuidedDisc", "SensorZeroing", "TensionEstimator", "ToolTracker"),
 }
 """Blocks that command nothing."""
 LEAD = {"Outside", "ProcedurePlayer", "TipReference"}

@@ -9,7 +9,7 @@ from plants.snake.balls import angles_of, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.friction import SnakeFrictionParams, flat_grip
-from plants.snake.parameters import SnakeParams
+from plants.snake.parameters import WIRES, SnakeParams
 from plants.snake.signals import (
     REST,
     DrumRates,
@@ -38,13 +38,13 @@ class BallSetPoint(NamedTuple):
 @compiled
 def _step(
     c: Any, snake: Any, last: np.ndarray, drums: Drums, rates: DrumRates, on: ToolForce
-) -> tuple[np.ndarray, BallSetPoint, Tensions, Stability]:
+) -> tuple[np.ndarray, BallSetPoint, Tensions, Tensions, Stability]:
     """The equilibrium a lead later, downhill from that of the last update."""
     wound = np.array(drums.wires) + c.lead * np.array(rates.wires)
     if not np.isfinite(wound).all():  # infinitely long is not slack
         wound[:] = np.nan
     load = np.array((on.f[0], on.f[1], on.f[2], 0.0, 0.0, 0.0))
-    turns, T, _, least, after, lost = held(last[:-1], c.stiffness, wound, load, snake)
+    turns, T, P, least, after, lost = held(last[:-1], c.stiffness, wound, load, snake)
     s = drums.s + c.travel_lead * rates.s
     s = s if np.isfinite(s) else last[-1]
     x: Any = np.append(np.array([s]), angles_of(turns))
@@ -52,7 +52,12 @@ def _step(
     state = np.append(after, np.array([s]))
     stability = Stability(least, 1.0 if lost else 0.0)
     tension: Any = T
-    return state, BallSetPoint(x, still), Tensions(tension), stability
+    tip: Any = T.copy()
+    for w in range(len(T)):  # of a mean P over a ball what is beyond is 2 P - T
+        for i in range(2 * (w // WIRES + 1)):
+            tip[w] = 2 * P[i, w] - tip[w]
+    set_point = BallSetPoint(x, still)
+    return state, set_point, Tensions(tension), Tensions(tip), stability
 
 
 class WireStatics(StepBlock):
@@ -67,6 +72,7 @@ class WireStatics(StepBlock):
     Port ``force`` accepts the `ToolForce`.
     Port ``desired_state`` emits the `BallSetPoint`.
     Port ``tension`` emits the `Tensions` at the drums.
+    Port ``tip_tension`` emits the `Tensions` at the tips, where wires end.
     Port ``stability`` emits the `Stability`.
     """
 
@@ -107,6 +113,7 @@ class WireStatics(StepBlock):
             {
                 "desired_state": BallSetPoint,
                 "tension": Tensions,
+                "tip_tension": Tensions,
                 "stability": Stability,
             },
             period,
