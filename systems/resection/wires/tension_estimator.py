@@ -128,9 +128,7 @@ class TensionEstimator(StepBlock):
         """Makes the block."""
         super().__init__()
         params = check(params or TensionEstimatorParams())
-        start = np.concatenate(
-            [np.zeros(1 + 2 * MODULES), np.full(BALLS * ROPES, np.nan)]
-        )
+        unknown = np.full(BALLS * ROPES, np.nan)
         self.declare_step(
             _step,
             [packed(params), Statics(snake).record],
