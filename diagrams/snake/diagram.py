@@ -22,7 +22,13 @@ from plants.snake.snake import add_snake, set_default_posture
 from systems.common.outside import Outside
 from systems.common.signal import size
 from systems.resection.wires.ball_location import BallLocation
+from systems.resection.wires.base_sensor import BaseSensor, SensorNoise
+from systems.resection.wires.contact_watch import ContactWatch
 from systems.resection.wires.hysteresis_compensation import HysteresisCompensation
+from systems.resection.wires.pretension_control import (
+    CellNoise,
+    PretensionControl,
+)
 from systems.resection.wires.resection_ik import ResectionIk
 from systems.resection.wires.snake_location import SnakeLocation
 from systems.resection.wires.tension_estimator import TensionEstimator
@@ -82,6 +88,21 @@ STATICS_WIRES = (
     ("wire_statics.stability", "wire_watch.stability"),
 )
 
+PRETENSION_WIRES = (
+    ("wire_inverse_actuation.drums", "pretension_control.command"),
+    ("wire_statics.tension", "pretension_control.tension"),
+    ("cell_noise.output", "pretension_control.noise"),
+    ("pretension_control.drums", "wire_drums.command"),
+)
+
+CONTACT_WIRES = (
+    ("plant.snake_state", "base_sensor.state"),
+    ("tool_load.force", "base_sensor.force"),
+    ("base_noise.output", "base_sensor.noise"),
+    ("base_sensor.wrench", "contact_watch.wrench"),
+    ("resection_ik.posture", "contact_watch.posture"),
+)
+
 ESTIMATOR_WIRES = (
     ("wire_statics.tension", "tension_estimator.tension"),
     ("resection_ik.posture", "tension_estimator.posture"),
@@ -130,6 +151,13 @@ ESTIMATOR_EXPORTS = {
     "wires.tip_tension": "wire_statics.tip_tension",
     "wires.interval": "tension_estimator.interval",
 }
+
+OPTIONS: dict[str, tuple[Any, dict[str, str]]] = {
+    "estimate": (ESTIMATOR_WIRES, ESTIMATOR_EXPORTS),
+    "control_pretension": (PRETENSION_WIRES, {"cells.code": "pretension_control.cell"}),
+    "feel": (CONTACT_WIRES, {"base.contact": "contact_watch.contact"}),
+}
+"""Keys that add blocks to a snake of free balls: their wires and exports."""
 
 HAND = ("wires_outside.told", "wire_drums.command")
 """The wire of a hand that winds the drums in the inverse actuation's place."""
@@ -205,7 +233,10 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, posture = scenario, start_posture(scenario)
     blocks: dict[str, Any] = {
-        "tip_reference": TipReference(replace(s.tip, lead=s.period), s.snake)
+        # What is between winding and drums costs a period.
+        "tip_reference": TipReference(
+            replace(s.tip, lead=s.period * (2 if s.control_pretension else 1)), s.snake
+        )
     }
     if s.wires == "drums":
         return blocks | drum_chain(s, s.snake, posture)
@@ -219,14 +250,32 @@ def make_blocks(scenario: SnakeScenario) -> dict[str, Any]:
             ),
             "elastic_wires": ElasticWires(s.elastic, s.snake, s.drive),
         }
+    # A controller of its own stands in the ideal one's place.
+    slack = replace(s.drive, pretension=0.0) if s.control_pretension else s.drive
     blocks |= {
         **wire_chain(s, s.snake, posture, s.core, stiffness=stiffness),
         "snake_location": BallLocation(s.snake),
         "tool_load": ToolLoad(replace(s.load, period=s.period)),
         "wire_statics": WireStatics(
-            s.snake, s.drive, s.core, s.period, posture, s.friction
+            s.snake, slack, s.core, s.period, posture, s.friction
         ),
     }
+    if s.control_pretension:
+        *lengths, travel = start_lengths(s)
+        control = replace(s.pretension, period=s.period)
+        wound = Drums(tuple(lengths), travel)
+        blocks["pretension_control"] = PretensionControl(control, s.drive, wound)
+        blocks["cell_noise"] = RandomSource(
+            RandomDistribution.kGaussian, size(CellNoise), s.period
+        )
+    if s.feel:
+        blocks["base_sensor"] = BaseSensor(s.base, s.snake, s.drive)
+        blocks["base_noise"] = RandomSource(
+            RandomDistribution.kGaussian, size(SensorNoise), s.period
+        )
+        blocks["contact_watch"] = ContactWatch(
+            replace(s.contact, period=s.period), s.snake, s.drive
+        )
     if s.estimate:
         blocks["tension_estimator"] = TensionEstimator(
             replace(s.estimator, period=s.period), s.snake
@@ -285,8 +334,11 @@ def make_snake_diagram(
     if scenario.compensation == "tracked":
         wires += TRACKER_WIRES
     exports = EXPORTS | EXPORTS_OF[scenario.wires]
-    if scenario.estimate:
-        wires, exports = wires + ESTIMATOR_WIRES, exports | ESTIMATOR_EXPORTS
+    for key, (added, told) in OPTIONS.items():
+        if getattr(scenario, key):
+            sinks = {sink for _, sink in added}
+            wires = (*(wire for wire in wires if wire[1] not in sinks), *added)
+            exports = exports | told
     if scenario.guided is not None:
         *lengths, s = start_lengths(scenario)
         rest = Drums(tuple(lengths), s)

@@ -9,6 +9,9 @@ from systems.resection.wires.tip_reference import turned
 SETTLED = 0.3
 """Errors at a pose count over the last so many seconds of its dwell."""
 
+UNFELT = 0.02
+"""Force in N below which a contact that is told counts as none."""
+
 
 def break_time(scenario: Any) -> float | None:
     """When the first wire snaps [s]; None if none does."""
@@ -58,6 +61,7 @@ def measure(run: Any) -> dict[str, Any]:
         "max_axis_error": float(angle.max()) if some else None,
         **_balls(run, alarm, lost),
         **_interval(run),
+        **_felt(run),
         "min_tension": float(tension.min()),
         "max_tension": float(tension.max()),
         "break_detection_time": alarm - snapped if found and snapped else None,
@@ -93,6 +97,22 @@ def _interval(run: Any) -> dict[str, Any]:
         "tension_inside": float(inside.mean()),
         "tension_width": float(np.median(found.upper - found.lower)),
     }
+
+
+def _felt(run: Any) -> dict[str, Any]:
+    """When a contact was told, and how often there was none."""
+    figures: dict[str, Any] = {}
+    if run.scenario.control_pretension:
+        figures["cell_code"] = int(run.cells.code.code[-1])
+    if run.scenario.feel:
+        told = run.base.contact.flag != 0.0
+        force = np.linalg.norm(run.tool.force.f, axis=1)
+        began = told & ~np.append(False, told[:-1])
+        figures["contact_at"] = (
+            float(run.signals["time"][told.argmax()]) if told.any() else None
+        )
+        figures["false_contacts"] = int((began & (force < UNFELT)).sum())
+    return figures
 
 
 def swings(run: Any) -> np.ndarray:

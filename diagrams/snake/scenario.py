@@ -12,9 +12,12 @@ from plants.snake.parameters import SnakeParams
 from plants.snake.reachability import why_not
 from plants.snake.signals import ToolTarget
 from systems.common.parameter import Rules, parameter, part
+from systems.resection.wires.base_sensor import BaseSensorParams
+from systems.resection.wires.contact_watch import ContactWatchParams
 from systems.resection.wires.hysteresis_compensation import (
     HysteresisCompensationParams,
 )
+from systems.resection.wires.pretension_control import PretensionControlParams
 from systems.resection.wires.resection_ik import ResectionIkParams
 from systems.resection.wires.tension_estimator import TensionEstimatorParams
 from systems.resection.wires.tip_reference import TipReferenceParams, reference
@@ -75,6 +78,15 @@ class SnakeScenario(Scenario):
         False, "whether bounds of the tensions at the tips are estimated"
     )
     estimator: TensionEstimatorParams = part(TensionEstimatorParams)
+    control_pretension: bool = parameter(
+        False, "whether load cells' controller takes slack up, not an ideal one"
+    )
+    pretension: PretensionControlParams = part(PretensionControlParams)
+    feel: bool = parameter(
+        False, "whether a sensor under the drive pack feels contacts"
+    )
+    base: BaseSensorParams = part(BaseSensorParams)
+    contact: ContactWatchParams = part(ContactWatchParams)
     load: ToolLoadParams = part(ToolLoadParams)
     watch: WireWatchParams = part(WireWatchParams)
 
@@ -89,7 +101,8 @@ class SnakeScenario(Scenario):
         yield free or smooth, "friction", f"none {told}, that know it"
         plain = self.compensation == "none"
         yield free or plain, "compensation", f"none {told}, that know friction"
-        yield free or not self.estimate, "estimate", f"none {told}, that know tips"
+        for key in ("estimate", "control_pretension", "feel"):
+            yield free or not getattr(self, key), key, f"none {told}"
         for name, target in _targets(self.tip, self.snake):
             if not tool_postures(*target, self.snake).reached:
                 raise ScenarioError(f"{name}: {why_not(*target, self.snake)}")

@@ -17,6 +17,8 @@ from diagrams.snake.scenario import SnakeScenario
 from diagrams.snake.wire_replay import animate_wires
 from plants.snake.signals import Drums, Stability, Tensions, ToolForce, ToolPose
 from systems.resection.wires.ball_location import BallAngles, Gaps
+from systems.resection.wires.contact_watch import Contact
+from systems.resection.wires.pretension_control import CellCode
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
 from systems.resection.wires.tension_estimator import TensionInterval
@@ -41,9 +43,10 @@ STATICS_SIGNALS = {
     "wires.stability": Stability,
     "tool.force": ToolForce,
 }
-ESTIMATOR_SIGNALS = {
-    "wires.tip_tension": Tensions,
-    "wires.interval": TensionInterval,
+OPTION_SIGNALS: dict[str, dict[str, Any]] = {
+    "estimate": {"wires.tip_tension": Tensions, "wires.interval": TensionInterval},
+    "control_pretension": {"cells.code": CellCode},
+    "feel": {"base.contact": Contact},
 }
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
@@ -61,7 +64,9 @@ def signals(scenario: SnakeScenario) -> dict[str, Any]:
     """What is logged of a scenario."""
     free = scenario.wires == "statics"
     known = SIGNALS | (STATICS_SIGNALS if free else PAPERS_SIGNALS)
-    return known | (ESTIMATOR_SIGNALS if scenario.estimate else {})
+    for key, more in OPTION_SIGNALS.items():
+        known = known | (more if getattr(scenario, key) else {})
+    return known
 
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:

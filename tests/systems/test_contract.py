@@ -196,6 +196,7 @@ COMMANDS = {
     "JointCommands": {"posture": HELD, "set_point": HELD},
     "OrcaPlanner": {"v_R": RATE},
     "PassiveWristEmulation": {"tool": TOOL},
+    "PretensionControl": {"drums": HELD},
     "ResectionIk": {"posture": HELD},
     "SnakeTask": {"target": HELD},
     "StatechartPlanner": {"v_R": RATE},
@@ -222,6 +223,7 @@ OBSERVE = {
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
     *("NavigationMonitor", "TissueForce", "WallWrench"),
     *("GuidedDisc", "SensorZeroing", "TensionEstimator", "ToolTracker"),
+    *("BaseSensor", "ContactWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"Outside", "ProcedurePlayer", "TipReference"}

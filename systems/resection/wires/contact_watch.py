@@ -31,7 +31,9 @@ class Contact(NamedTuple):
     """What touches the snake."""
 
     flag: Annotated[float, Field("1", "1 while something does", 0.0)]
-    f: Annotated[Vector, Field("N", "its force, mean of the window", (0, 0, 0), AXES)]
+    f: Annotated[
+        Vector, Field("N", "its force, mean of the window", (0.0, 0.0, 0.0), AXES)
+    ]
     arm: Annotated[float, Field("m", "of the force about W's origin, at least", 0.0)]
 
 

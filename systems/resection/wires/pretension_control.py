@@ -57,7 +57,7 @@ class PretensionControlParams:
         0.3, "T_0 that each wire is to have at least", "N", least=0.0, most=20.0
     )
     gain: float = parameter(
-        10.0, "k_i: share of the want taken up in a second", "1/s", above=0.0, most=50.0
+        20.0, "k_i: share of the want taken up in a second", "1/s", above=0.0, most=50.0
     )
     rate: float = parameter(
         0.01, "largest speed of winding", "m/s", least=1e-4, most=0.1
