@@ -1,7 +1,7 @@
 """A step with friction in a few steps of Newton's: tensions and bounds at once.
 
-`statics.slid` fixes what friction can hold, goes downhill, and repeats. Near the end of
-a step one can do better. Over ball i, of x_i = tanh(mu theta_i / 2) clip(slip / give),
+`equilibrium.slid` fixes what friction can hold, goes downhill, and repeats. Near the
+end of a step one can do better. Over ball i, of x_i = tanh(mu theta_i / 2) clip(slip / give),
 
     T_i = T_(i-1) (1 + x_i) / (1 - x_i),   P_i = T_(i-1) / (1 - x_i) = c_i T,
 

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import tool_of, tool_pose, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
+from plants.snake.equilibrium import ahead, followed
 from plants.snake.friction import GRIP, SnakeFrictionParams, flat_grip
 from plants.snake.parameters import DRUMS, SnakeParams
 from plants.snake.signals import REST, Drums, Posture
-from plants.snake.statics import Statics, ahead, followed
+from plants.snake.statics import Statics
 from plants.snake.tool_target import target_of
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter, part

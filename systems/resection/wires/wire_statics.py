@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import angles_of, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
+from plants.snake.equilibrium import held
 from plants.snake.friction import SnakeFrictionParams, flat_grip
 from plants.snake.parameters import WIRES, SnakeParams
 from plants.snake.signals import (
@@ -20,7 +21,7 @@ from plants.snake.signals import (
     ToolForce,
 )
 from plants.snake.snake import BALL_POSITIONS
-from plants.snake.statics import Statics, held
+from plants.snake.statics import Statics
 from systems.common.compiled import compiled, packed
 from systems.common.signal import Field
 from systems.common.step_block import StepBlock
