@@ -1,7 +1,8 @@
 """A step with friction in a few steps of Newton's: tensions and bounds at once.
 
 `equilibrium.slid` fixes what friction can hold, goes downhill, and repeats. Near the
-end of a step one can do better. Over ball i, of x_i = tanh(mu theta_i / 2) clip(slip / give),
+end of a step one can do better. Over ball i, with x_i = tanh(mu theta_i / 2) s_i and
+s_i the share of `give` by which the wire has slipped, in [-1, 1],
 
     T_i = T_(i-1) (1 + x_i) / (1 - x_i),   P_i = T_(i-1) / (1 - x_i) = c_i T,
 

@@ -178,6 +178,9 @@ def test_coupled_pairs_are_the_papers_snake():
         "load.cutting=0.1",
         "friction.wire=0.1",
         "compensation=model",
+        "estimate=true",
+        "control_pretension=true",
+        "feel=true",
     ],
 )
 def test_what_a_wire_model_does_not_know_is_refused(override):
@@ -195,6 +198,15 @@ def test_a_model_and_a_tracked_tool_help_a_snake_that_cuts():
     assert helped["max_tool_error"] < 1.5e-3
     assert helped["stops"] == 0 and helped["buckled_at"] is None
     assert helped["min_tension"] == pytest.approx(0.3)
+
+
+def test_what_is_sensed_bounds_the_tips_and_feels_a_touch():
+    touched = "load={force: [0.2, 0, 0], start: 1.5, end: 1.52}"
+    keys = ["estimate=true", "feel=true", "compensation=model", touched]
+    figures = simulate(load_scenario("snake_cut", keys, 1, 2.0)).metrics
+    assert figures["tension_inside"] == 1.0
+    assert 1.5 < figures["contact_at"] < 1.7
+    assert figures["false_contacts"] == 0
 
 
 def test_a_reversal_leaves_a_loop_with_friction_alone():
