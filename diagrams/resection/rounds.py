@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from diagrams.common.progress import Progress
 from diagrams.resection.operation import new_session
 from diagrams.resection.scenario import ResectionScenario
-from diagrams.resection.sight import Sight
+from diagrams.resection.sight import ALL, MOUTH, Sight
 from plants.tissue.labels import CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.tissue import Tissue
@@ -47,7 +47,7 @@ class Rehearsal:
     Attributes:
         reachable: Share of the tumour that can be reached if nothing moves.
         rounds: A row each: shares of the tumour `resected` and `healthy` so far,
-            `time` [s], the `rim` kept [m], largest `moved` and `error` of the fit in
+            `time` [s], the `stage`, largest `moved` and `error` of the fit in
             the tumour that is left [m], `rms` of the points seen [m].
         stopped: Why it ended before nothing more was to do; "" if it did not.
         hits: Checks that found the body in tissue.
@@ -100,14 +100,16 @@ class Rounds:
         self.player = replace(scenario.player, lead=scenario.period)
         self.share = params.reserve / params.feared if scan.on else 1.0
         self.budget = STROKES if scan.on else scenario.planner.budget
-        self.rim = params.feared if scan.on else 0.0
+        self.stage, self.rim = MOUTH, params.feared
         self.ended = False
         if file is not None and file.is_file():
             self._resume(file)
             return
         self.told = Rehearsal(self._reach(anew=True).fraction)
         if self.sight is not None:
-            self._believe(self.sight.shown(self.rim), self.sight.material.fixed)
+            self._believe(
+                self.sight.shown(self.stage, self.rim), self.sight.material.fixed
+            )
         self.keep()
 
     @property
@@ -124,7 +126,7 @@ class Rounds:
         removed += self.truth.resected
         self._tell(postures)
         done = removed < LEAST and self.planned < self.budget
-        if self.sight is None or (done and self.rim == 0.0) or self.number > ROUNDS:
+        if self.sight is None or (done and self.stage == ALL) or self.number > ROUNDS:
             self.ended = True
             return
         # As many strokes as remove what the margin allows for.
@@ -141,10 +143,11 @@ class Rounds:
         left = self.sight.left(gone)
         self.ended = bool(self.told.stopped) or left == 0.0
         beyond = max(left - (1.0 - self.told.reachable), 0.0)
+        self.stage += int(done)
         # What is still to go may move the tissue by so much.
-        self.rim = 0.0 if done else self.scenario.rehearsal.feared * beyond
+        self.rim = self.scenario.rehearsal.feared * beyond
         if not self.ended:
-            self._believe(self.sight.shown(self.rim), gone)
+            self._believe(self.sight.shown(self.stage, self.rim), gone)
             self.keep()
 
     def _plan(self) -> tuple[int, NDArray[np.int32]]:
@@ -192,7 +195,7 @@ class Rounds:
                 "resected": truth.resected,
                 "healthy": truth.healthy,
                 "time": time + (scan.time if scan.on else 0.0),
-                "rim": self.rim,
+                "stage": self.stage,
             }
         )
         told.hits, told.way = truth.hits, truth.way
@@ -222,6 +225,7 @@ class Rounds:
             "told": asdict(self.told),
             "budget": self.budget,
             "rim": self.rim,
+            "stage": self.stage,
         }
         arrays = {
             "session": np.frombuffer(plan.read_bytes(), np.uint8),
@@ -247,6 +251,7 @@ class Rounds:
             self.session.file = None
             self.told = Rehearsal(**meta["told"])
             self.budget, self.rim = int(meta["budget"]), float(meta["rim"])
+            self.stage = int(meta["stage"])
             truth, told = self.truth, self.told
             truth.material.gone = arrays["gone"]
             truth.hits, truth.way = told.hits, told.way

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from diagrams.resection.scenario import ResectionScenario
-from plants.tissue.labels import TUMOUR
+from plants.tissue.labels import BRAIN, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
 from plants.tissue.volume import Volume
@@ -21,7 +21,12 @@ from plants.tissue.yielding import BLUR, CLEAR, Field, YieldingTissue, apart
 from systems.resection.planning.registration import Fit, Surface, registered
 from systems.resection.planning.session import Session
 
-VEL = True
+MOUTH, RIM, ALL = range(3)
+"""Stages: what lies beside the channel's mouth, all but a rim, and the rim."""
+
+MODULES = 1
+"""Whose length, straight, is beside the mouth: what the last one alone bends to."""
+
 PARTS = 6
 """Of a round, in each of which the tissue is taken to have stood still."""
 
@@ -57,18 +62,22 @@ class Sight:
         """The displacement that is believed."""
         return self.fit.displacement(self.middle, self.half)
 
-    def shown(self, rim: float) -> NDArray[np.uint8]:
-        """Labels where they are believed to be; a rim of the tumour counts healthy.
+    def shown(self, stage: int, rim: float) -> NDArray[np.uint8]:
+        """Labels where they are believed to be; what is kept for later counts healthy.
 
-        Before the channel there is none, or the robot could not enter.
+        Before the channel there is no rim: the robot could not enter; and what lies
+        beside its mouth comes first, before it moves to where no bend reaches it.
         """
-        labels, _ = self.material.shown(self.moved, rim)
+        labels, _ = self.material.shown(self.moved)
+        kept, _ = self.material.shown(self.moved, rim)
         x, y, z = np.moveaxis(self.material.places.reshape(*labels.shape, 3), -1, 0)
-        volume = self.volume
+        volume, snake = self.volume, self.scenario.snake
+        beside = z <= volume.depth + MODULES * snake.straight_module
         before = (x * x + y * y <= volume.channel**2) & (z <= volume.depth + rim)
-        if rim > 0.0:
-            full, _ = self.material.shown(self.moved)
-            labels[before] = full[before]
+        later = (kept != TUMOUR) & ~beside & ~before
+        if stage == MOUTH:
+            later |= ~beside
+        labels[later & (labels == TUMOUR) & (stage < ALL)] = BRAIN
         return labels
 
     def left(self, gone: NDArray[np.bool_]) -> float:
@@ -103,7 +112,8 @@ class Sight:
             went, count = progress_of(session, thought, first)
             feared = rehearsal.feared * count / self.whole
             postures = session.postures[first:]
-            again = np.clip(session.volume.tau - first, 0, len(went) - 1)
+            tau = session.volume.tau.astype(np.int64)
+            again = np.clip(tau - first, 0, len(went) - 1)
             gone, row["rms"] = self._surface(postures, went, again, feared, rng)
         labels, _ = self.material.shown(self.moved)
         left = self.volume.points((labels == TUMOUR) & ~gone)
@@ -130,12 +140,10 @@ class Sight:
             & apart(volume, points, self.material.fixed, CLEAR)
         ]
         share = max(1.0 - self.left(gone), self.share)
-        if VEL and self.share > 0:
-            f = share / self.share
-            self.fit = Fit(f * self.fit.theta, f * f * self.fit.spread)
-            self.fit = self.fit.later(self.scenario.rehearsal.feared * (share - self.share))
-        else:
-            self.fit = self.fit.later(self.scenario.rehearsal.feared * share, self.scenario.rehearsal.feared * self.share)
+        if self.share > 0.0:  # what moved so far, moves on alike
+            self.fit = self.fit.scaled(share / self.share)
+        feared = self.scenario.rehearsal.feared
+        self.fit = self.fit.later(feared * (share - self.share))
         self.share = share
         if len(points) == 0:
             return gone, 0.0

@@ -92,10 +92,14 @@ class Fit:
     theta: Array = field(default_factory=lambda: np.zeros((10, 3)))
     spread: Array = field(default_factory=lambda: np.zeros((30, 30)))
 
-    def later(self, feared: float, before: float = 0.0) -> "Fit":
-        """When so much is feared, in m, where before it was less."""
-        more = np.repeat((feared**2 - before**2) * PRIOR**2, 3)
+    def later(self, feared: float) -> "Fit":
+        """After the tissue may have moved by so much, in m."""
+        more = np.repeat((feared * PRIOR) ** 2, 3)
         return Fit(self.theta, self.spread + np.diag(more))
+
+    def scaled(self, factor: float) -> "Fit":
+        """So many times of it."""
+        return Fit(factor * self.theta, factor**2 * self.spread)
 
     def displacement(self, middle: Array, length: float) -> Callable[[Array], Array]:
         """In m, of places (..., 3), about the tumour's middle and half its length."""
