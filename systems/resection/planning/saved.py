@@ -68,7 +68,7 @@ def check_removed(session: Any) -> None:
     """
     volume, tips = session.volume, session.tips
     tau, fresh = volume.tau, volume.fresh().tau
-    reach = session.params.tool_radius + volume.spacing
+    reach = float(session.tool_radii.max()) + volume.spacing
     # What a channel bored, and what a scan found to be free.
     others = [channel.time for channel in volume.more]
     others += [step.first - 1 for step in session.steps if step.kind == "update"]
