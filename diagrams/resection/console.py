@@ -143,7 +143,7 @@ class Console:
         if command == "access":
             return self._access(words[1:])
         if command == "tools":
-            tools = next_tools(self.session, self.scenario.tools, self.scenario.seed)
+            tools = next_tools(self.session, self.scenario.balls, self.scenario.seed)
             return "\n".join(tool.text() for tool in tools) or "none"
         if command == "tool" and len(words) == 2:
             step = self.session.change_tool(1e-3 * float(words[1]))

@@ -67,7 +67,7 @@ class Operation(Case):
         for channel in self.session.volume.more:
             waits[channel.time - 1] = self.scenario.entries.time
         for tool in self.session.tools:
-            waits[tool.time - 1] = self.scenario.tools.time
+            waits[tool.time - 1] = self.scenario.balls.time
         return waits
 
 
@@ -271,7 +271,7 @@ def finish_plan(
 
 def change_tool(session: Session, scenario: ResectionScenario) -> bool:
     """Changes to the tool that adds most to what this one has removed, if one does."""
-    params, entry = scenario.tools, session.entries
+    params, entry = scenario.balls, session.entries
     used = sum(entry[tool.time] == entry[-1] for tool in session.tools)
     found = next_tools(session, params, scenario.seed) if used < params.most else []
     if not found:

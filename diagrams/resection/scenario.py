@@ -102,7 +102,7 @@ class ResectionScenario(Scenario):
     automatic: bool = parameter(False, "whether the planner goes on after them")
     planner: PlannerParams = part(PlannerParams)
     entries: EntriesParams = part(EntriesParams)
-    tools: ToolsParams = part(ToolsParams)
+    balls: ToolsParams = part(ToolsParams)
     reach_effort: float = parameter(
         1.0, "scales how long the reachable part is searched", above=0.0, most=100.0
     )
