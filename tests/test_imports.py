@@ -128,7 +128,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.keyhole.access",
         "diagrams.resection.console",
         "diagrams.resection.operation",
-        "diagrams.resection.rehearsal",
+        "diagrams.resection.rounds",
         "diagrams.resection.scenario",  # the planner's parameters
     }
     assert importers(arrows, "diagrams.resection.operation") == {
@@ -137,7 +137,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.resection.console",
         "diagrams.resection.diagram",  # the case's type
         "diagrams.resection.planned",
-        "diagrams.resection.rehearsal",
+        "diagrams.resection.rounds",
         "diagrams.resection.study",
     }
 

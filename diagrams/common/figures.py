@@ -145,6 +145,8 @@ FIGURES = {
     "strokes": Figure("", "continuous passes of the tool that finish"),
     "single_step_share": Figure("%", "of the resected volume, by single steps"),
     "entries": Figure("", "channels that were used"),
+    "tool_changes": Figure("", "of the tool, in the plan"),
+    "tool_change_time": Figure("s", "that tool changes take"),
     "bored_healthy": Figure("m3", "healthy tissue that further channels bored"),
     "critical_touched": Figure("", "whether anything critical was touched"),
     "planning_time": Figure("s", "wall time of the plan"),

@@ -17,6 +17,7 @@ from plants.tissue.mask import load_mask
 from systems.resection.planning.feasibility import place
 from systems.resection.planning.feasibility_map import FeasibilityMap, feasibility_map
 from systems.resection.planning.next_entry import NextEntry, next_entries
+from systems.resection.planning.next_tool import next_tools
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.procedure import (
     ELEMENTARY,
@@ -41,6 +42,7 @@ map                                  where elementary volumes are feasible now
 reach                                what can be reached at all, and why the rest not
 finish                               let the planner do the rest
 entries | access N                   what further entries would add | take the N-th
+tools | tool R                       what another ball would add | change to one [mm]
 update FILE                          an image taken meanwhile replaces the mask
 list | quit                          the plan; the session is saved
 save FILE | load FILE                its procedures as JSON; commit those of a file"""
@@ -140,6 +142,12 @@ class Console:
             return "\n".join(f"{n}: {row}" for n, row in enumerate(rows, 1)) or "none"
         if command == "access":
             return self._access(words[1:])
+        if command == "tools":
+            tools = next_tools(self.session, self.scenario.balls, self.scenario.seed)
+            return "\n".join(tool.text() for tool in tools) or "none"
+        if command == "tool" and len(words) == 2:
+            step = self.session.change_tool(1e-3 * float(words[1]))
+            return f"{step.name}; {self._share()}"
         if command == "update" and len(words) == 2:
             self.session.update(load_mask(words[1], self.scenario.labels))
             return f"updated; {self._share()}"

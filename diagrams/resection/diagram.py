@@ -22,6 +22,7 @@ RESECTION_WIRES = (
     # What the tool's true path removes.
     ("snake_location.posture", "tissue_carver.posture"),
     ("procedure_player.entry", "tissue_carver.entry"),
+    ("procedure_player.tool", "tissue_carver.tool"),
 )
 
 EXPORTS = {
@@ -54,6 +55,7 @@ def make_blocks(case: Operation) -> dict[str, Any]:
             done.posture,
             case.waits,
             case.session.entries,
+            case.session.tool_radii,
         ),
         "tissue_carver": TissueCarver(
             replace(s.carver, period=s.period),

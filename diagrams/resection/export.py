@@ -185,10 +185,11 @@ def plan_of(session: Session, label: NDArray[np.uint8]) -> dict[str, Any]:
         "X_PW": volume.X_PW.tolist(),
         "X_WE": [np.eye(4).tolist(), *(c.X_WE.tolist() for c in volume.more)],
         "channel": {"radius": volume.channel, "depth": volume.depth},
-        "robot": asdict(session.params),
+        "robot": asdict(session.own),
         "steps": [asdict(step) for step in session.steps],
         "postures": session.postures.tolist(),
         "entries": session.entries.tolist(),
+        "tool_radii": session.tool_radii.tolist(),
     }
 
 

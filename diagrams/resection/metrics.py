@@ -70,6 +70,8 @@ def measure(run: Any) -> dict[str, Any]:
         "max_outside_depth": outside_depth(carving_of(run).volume),
         "entries": 1 + len(session.volume.more),
         "bored_healthy": bored_healthy(session.volume),
+        "tool_changes": len(session.tools),
+        "tool_change_time": len(session.tools) * run.case.scenario.balls.time,
         "min_critical_distance": nearest if nearest >= 0.0 else None,
         "body_collisions": int(touched.hits[-1]),
         "procedures": sum(step.kind not in ("home", STROKES) for step in steps),

@@ -22,6 +22,7 @@ from plants.tissue.volume import Access, make_volume
 from systems.common.archive import before, beside
 from systems.resection.planning.access import propose_access
 from systems.resection.planning.next_entry import next_entries
+from systems.resection.planning.next_tool import next_tools
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.reach import (
     Lump,
@@ -65,6 +66,8 @@ class Operation(Case):
         waits = np.zeros(len(self.session.postures))
         for channel in self.session.volume.more:
             waits[channel.time - 1] = self.scenario.entries.time
+        for tool in self.session.tools:
+            waits[tool.time - 1] = self.scenario.balls.time
         return waits
 
 
@@ -122,8 +125,8 @@ def resumed(file: Path, fresh: Session) -> Session:
         name: (getattr(session, name), getattr(fresh, name))
         for name in ("clearance", "accuracy")
     }
-    told = vars(session.params)
-    pairs |= {f"snake.{k}": (told[k], v) for k, v in vars(fresh.params).items()}
+    told = vars(session.own)
+    pairs |= {f"snake.{k}": (told[k], v) for k, v in vars(fresh.own).items()}
     differs = [
         f"{k} ({was} there, {is_now} here)"
         for k, (was, is_now) in pairs.items()
@@ -234,7 +237,7 @@ def finish_plan(
     """
     params, mask, taken = scenario.entries, reach.mask, reach.time
     while True:
-        if session.volume.more:
+        if session.volume.more or session.tools:
             what = f"what entry {1 + len(session.volume.more)} can reach"
             with progress(what, "of the tumour") as show:
                 reach = find_reach(
@@ -248,6 +251,8 @@ def finish_plan(
         run_planner(session, reach, scenario, progress)
         mask = mask | reach.mask | session.volume.resected
         fraction = session.reaches(mask)
+        if change_tool(session, scenario):
+            continue
         if 1 + len(session.volume.more) >= params.most:
             break
         with progress("a further entry", "of those tried") as show:
@@ -262,6 +267,18 @@ def finish_plan(
         session.enter_anew(found[0].X_WE)
     lumps = [lump for lump in reach.lumps if not _gone(session, lump)]
     return replace(reach, mask=mask, fraction=fraction, time=taken, lumps=lumps)
+
+
+def change_tool(session: Session, scenario: ResectionScenario) -> bool:
+    """Changes to the tool that adds most to what this one has removed, if one does."""
+    params, entry = scenario.balls, session.entries
+    used = sum(entry[tool.time] == entry[-1] for tool in session.tools)
+    found = next_tools(session, params, scenario.seed) if used < params.most else []
+    if not found:
+        return False
+    print(f"trocar: another tool: {found[0].text()}", file=sys.stderr)
+    session.change_tool(found[0].radius)
+    return True
 
 
 def _gone(session: Session, lump: Lump) -> bool:

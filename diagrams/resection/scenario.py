@@ -13,6 +13,7 @@ from plants.tissue.volume import Access
 from plants.tissue.yielding import CavityScanParams, TissueShiftParams
 from systems.common.parameter import Rules, parameter, part
 from systems.resection.planning.next_entry import EntriesParams
+from systems.resection.planning.next_tool import ToolsParams
 from systems.resection.planning.planner import PlannerParams
 from systems.resection.planning.procedure import Procedure, check_procedure
 from systems.resection.wires.procedure_player import ProcedurePlayerParams
@@ -101,6 +102,7 @@ class ResectionScenario(Scenario):
     automatic: bool = parameter(False, "whether the planner goes on after them")
     planner: PlannerParams = part(PlannerParams)
     entries: EntriesParams = part(EntriesParams)
+    balls: ToolsParams = part(ToolsParams)
     reach_effort: float = parameter(
         1.0, "scales how long the reachable part is searched", above=0.0, most=100.0
     )

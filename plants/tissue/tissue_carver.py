@@ -57,6 +57,12 @@ class Entry(NamedTuple):
     number: Annotated[float, Field("1", "0 for the first", 0.0)]
 
 
+class ToolBall(NamedTuple):
+    """Which tool the robot carries."""
+
+    radius: Annotated[float, Field("m", "of its ball", 4e-3)]
+
+
 class Cutting(NamedTuple):
     """Whether the tool has power: without it, it pushes tissue aside."""
 
@@ -195,9 +201,7 @@ class Carving:
         self.labels = volume.labels.reshape(-1)
         self.params = params
         self.body = body_of(params)
-        self.bodies = [self.body] + [
-            body_of(params, X_WE=channel.X_WE) for channel in volume.more
-        ]
+        self.bodies: dict[tuple[int, float], Body] = {}
         self.critical: NDArray[np.float32] = volume.to_critical.reshape(-1)
         self.latest = self.done.index
         self.space: Space = self.volume.space()
@@ -210,8 +214,11 @@ class Carving:
         pitch: float,
         entry: int = 0,
         cutting: bool = True,
+        radius: float | None = None,
     ) -> Any:
         """Carves from posture x0 to x1 as the index after `index`, through an entry.
+
+        The tool's ball has a radius in m, the robot's own if None.
 
         Its channel is bored if it has not been: the access robot's part, of which
         the tumour counts as removed.
@@ -229,7 +236,7 @@ class Carving:
             self.space = self.volume.space()
         tumour, *others = carve(
             self.space,
-            self.bodies[entry] if entry else self.body,
+            self.body_in(entry, radius or self.params.tool_radius),
             self.labels,
             self.critical,
             x0,
@@ -239,6 +246,15 @@ class Carving:
             cutting,
         )
         return tumour + bored, *others
+
+    def body_in(self, entry: int, radius: float) -> Body:
+        """The body in an entry, with a tool's ball of a radius in m."""
+        key = entry, radius
+        if key not in self.bodies:
+            X_WE = self.channels[entry - 1].X_WE if entry else None
+            params = replace(self.params, tool_radius=radius)
+            self.bodies[key] = body_of(params, X_WE=X_WE)
+        return self.bodies[key]
 
     @property
     def bored(self) -> list[int]:
@@ -255,6 +271,7 @@ class TissueCarver(Block):
     Port ``posture`` accepts the snake's true `Posture`.
     Port ``entry`` accepts the number of the channel it works through; the first if
     nothing is connected.
+    Port ``tool`` accepts the `ToolBall` it carries; its own if nothing is connected.
     Port ``cutting`` accepts whether the tool has power, `Cutting`; unconnected it has.
     Port ``index`` emits how many `Moves` were carved.
     Port ``removed`` emits the tissue `Removed`.
@@ -277,6 +294,7 @@ class TissueCarver(Block):
         self._voxel = self.carving.volume.voxel
         self._posture = self.signal_in("posture", Posture)
         self._entry = self.signal_in("entry", Entry)
+        self._tool = self.signal_in("tool", ToolBall)
         self._cutting = self.signal_in("cutting", Cutting)
         done = self.carving.done
         self.state_out("index", Moves, flat(Moves(float(done.index))))
@@ -316,10 +334,13 @@ class TissueCarver(Block):
         x, entry, cutting = self._posture.Eval(context), 0, True
         if self._entry.HasValue(context):
             entry = int(self._entry.Eval(context)[0])
+        radius = None
+        if self._tool.HasValue(context):
+            radius = float(self._tool.Eval(context)[0])
         if self._cutting.HasValue(context):
             cutting = bool(self._cutting.Eval(context)[0] == 1.0)
         tumour, healthy, hits, nearest, moved = self.carving.move(
-            int(index), np.array(before), x, self._params.pitch, entry, cutting
+            int(index), np.array(before), x, self._params.pitch, entry, cutting, radius
         )
         so_far = Touched(*touched)
         if math.isfinite(nearest):

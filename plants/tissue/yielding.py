@@ -6,6 +6,7 @@ at first (*material*): a place p shows the material at p - d(p). The channel hol
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 import math
 from typing import Any
@@ -129,9 +130,17 @@ class Material:
         ).reshape(self.labels.shape)
         return told
 
-    def shown(self, d: Field) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-        """Labels, and what is gone, at each place of the grid."""
-        labels = np.where(self.at(d, self.border, 1) > 0.0, TUMOUR, BRAIN)
+    def untouched(self) -> "Material":
+        """The same as it was at first."""
+        other = copy(self)
+        other.gone = np.zeros(self.gone.shape, bool)
+        return other
+
+    def shown(
+        self, d: Field, rim: float = 0.0
+    ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        """Labels, and what is gone, at each place of the grid; a rim counts healthy."""
+        labels = np.where(self.at(d, self.border, 1) > rim, TUMOUR, BRAIN)
         if self.to_critical.size:
             labels[self.at(d, self.labels) == CRITICAL] = CRITICAL
         labels[self.fixed] = self.labels[self.fixed]
@@ -182,6 +191,12 @@ class YieldingTissue:
         self._whole = float(np.count_nonzero(volume.labels == TUMOUR))
         self.hits, self.nearest, self.way = 0, math.inf, 0.0
         self._freed = 0
+
+    def twin(self) -> "YieldingTissue":
+        """The same tissue before anything is gone, for what a robot believes."""
+        other = copy(self)
+        other.material = self.material.untouched()
+        return other
 
     @property
     def resected(self) -> float:

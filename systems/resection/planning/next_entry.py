@@ -194,18 +194,31 @@ def _lines(session: Session, params: EntriesParams) -> list[tuple[str, Matrix, M
     return lines
 
 
-def _gain(session: Session, X_WE: Matrix | None, seed: int, effort: float) -> float:
-    """Tumour in m3 that can be removed yet, at least, through an entry or as it is."""
+def gain_of(
+    session: Session, act: Callable[[Session], object], seed: int, effort: float
+) -> float:
+    """Tumour in m3 that can be removed yet, at least, after something is done.
+
+    Args:
+        session: How things stand; nothing changes.
+        act: What is done, in thought; if it cannot be, the gain is -1.
+        seed: Of the search.
+        effort: Of the search.
+    """
     thought = session.thought()
     try:
-        if X_WE is not None:
-            thought.enter_anew(X_WE)
+        act(thought)
     except ValueError:
         return -1.0
     for bend in (PILOT, session.params.max_bend):
         thought.commit(entry_pass(thought, bend, PITCH, "entry"))
     search(thought, new_draws(seed), effort)
     return thought.volume.resected_volume - session.volume.resected_volume
+
+
+def entering(X_WE: Matrix) -> Callable[[Session], object]:
+    """Setting a session's access robot anew."""
+    return lambda session: session.enter_anew(X_WE)
 
 
 def next_entries(
@@ -232,7 +245,7 @@ def next_entries(
 
     whole = len(lines) + params.finalists
     # What a search finds without another entry is no merit of one.
-    control = _gain(session, None, seed, SECOND_LOOK) if lines else 0.0
+    control = gain_of(session, lambda s: None, seed, SECOND_LOOK) if lines else 0.0
     for number, (way, through, n) in enumerate(lines):
         progress(number / whole)
         X = channel_along(volume, through, n)
@@ -241,13 +254,15 @@ def next_entries(
         bored = bored_by(volume, X, frames)
         if bored == 0.0:
             continue  # it is there
-        gained = _gain(session, X, seed, FIRST_LOOK)
+        gained = gain_of(session, entering(X), seed, FIRST_LOOK)
         angle = math.acos(float(np.clip(X[2, 2], -1.0, 1.0)))
         found.append(NextEntry(X, gained, bored, way, angle))
     found.sort(key=worth, reverse=True)
     best = found[: params.finalists]
     for number, entry in enumerate(best):
         progress((len(lines) + number) / whole)
-        entry.gained = _gain(session, entry.X_WE, seed, SECOND_LOOK) - control
+        entry.gained = (
+            gain_of(session, entering(entry.X_WE), seed, SECOND_LOOK) - control
+        )
     best = [e for e in best if e.gained >= params.least_gain * volume.tumour_volume]
     return sorted(best, key=worth, reverse=True)

@@ -98,6 +98,19 @@ class Procedure:
         return n / np.linalg.norm(n)
 
 
+@dataclass
+class ToolChange:
+    """A tool that the robot changed to.
+
+    Attributes:
+        radius: Of its ball in m.
+        time: Visit of the plan from which it carries it.
+    """
+
+    radius: float
+    time: int
+
+
 def with_tool(params: SnakeParams, tool: Tool | None) -> SnakeParams:
     """The robot with another tool."""
     if tool is None:

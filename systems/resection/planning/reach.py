@@ -116,7 +116,7 @@ def find_reach(
     scratch = session.thought()
     if anew:
         scratch = Session(
-            session.volume.fresh(), session.params, session.clearance, session.accuracy
+            session.volume.fresh(), session.own, session.clearance, session.accuracy
         )
     volume, first = scratch.volume, int(scratch.tree.size[0])
     for bend in (PILOT, session.params.max_bend):
@@ -194,7 +194,7 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any], session: Session) ->
 
 def _key(session: Session, seed: int, effort: float) -> str:
     labels = hashlib.sha256(session.volume.labels.tobytes()).hexdigest()
-    body = f"{session.params} {session.clearance} {session.accuracy}"
+    body = f"{session.own} {session.clearance} {session.accuracy}"
     return f"{labels} {session.volume.margin} {body} {seed} {effort}"
 
 

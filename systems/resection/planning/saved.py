@@ -68,9 +68,11 @@ def check_removed(session: Any) -> None:
     """
     volume, tips = session.volume, session.tips
     tau, fresh = volume.tau, volume.fresh().tau
-    reach = session.params.tool_radius + volume.spacing
-    bored = [channel.time for channel in volume.more]
-    planned = (tau > 0) & (tau != SOLID) & ~np.isin(tau, bored)
+    reach = float(session.tool_radii.max()) + volume.spacing
+    # What a channel bored, and what a scan found to be free.
+    others = [channel.time for channel in volume.more]
+    others += [step.first - 1 for step in session.steps if step.kind == "update"]
+    planned = (tau > 0) & (tau != SOLID) & ~np.isin(tau, others)
     points, times = volume.points(planned), tau[planned]
     a, b = tips[times - 1], tips[times]
     along = np.einsum("ij,ij->i", points - a, b - a)

@@ -28,6 +28,8 @@ from systems.resection.planning.feasibility import (
 )
 from systems.resection.planning.procedure import (
     Procedure,
+    Tool,
+    ToolChange,
     check_procedure,
     procedure_of,
     widest_bend,
@@ -43,6 +45,7 @@ from systems.resection.planning.tree import (
     extend,
     go_to,
     grown,
+    here,
     nearest_nodes,
     new_tree,
     tree_of,
@@ -63,6 +66,9 @@ UPDATE = "update"
 ACCESS = "access"
 """Kind of a step in which the access robot is set anew."""
 
+TOOL = "tool"
+"""Kind of a step in which the tool is changed."""
+
 STARTS = 24
 """Nodes from which a procedure's start is tried."""
 
@@ -73,8 +79,9 @@ class Step:
 
     Attributes:
         name: What it is called.
-        kind: "entry", "elementary", "volume", "strokes", "home" or "access": the
-            robot withdrawn, and set anew at the end of another channel, or "update".
+        kind: "entry", "elementary", "volume", "strokes", "home", "access" (the
+            robot withdrawn, and set anew at the end of another channel), "update" or
+            "tool".
         first: Its first visit in the route.
         last: One past its last visit.
         nodes: Nodes of the tree before it.
@@ -115,7 +122,7 @@ class Session:
 
     Attributes:
         volume: The tissue.
-        params: The robot.
+        params: The robot with the tool that it carries; it begins with `own`.
         clearance: That the plan keeps between body and tissue, in m.
         accuracy: To which the robot follows the plan, in m: its tool surely frees
             a ball that is smaller by this.
@@ -123,6 +130,7 @@ class Session:
         file: Where every commit is saved; nowhere if None.
         concluded: How a planner went about it that found nothing more to do.
         reached: Share of the tumour that can be reached, after each entry planned.
+        tools: Those that it changes to.
     """
 
     volume: Volume
@@ -133,10 +141,10 @@ class Session:
     file: Path | None = None
     concluded: str = ""
     reached: list[float] = field(default_factory=list)
+    tools: list[ToolChange] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        check(self.params)
-        self.home = home_posture(self.volume, self.params)
+        self.own = check(self.params)
         self.stand()
         c = np.empty((POINTS, 3))
         place(self.body, self.home, c)
@@ -144,7 +152,14 @@ class Session:
         self.why = np.zeros(CULPRIT)
 
     def stand(self) -> None:
-        """Puts the robot into the channel bored last."""
+        """Puts the robot with its tool into the channel bored last.
+
+        At home the largest ball that it has carried lies within the channel.
+        """
+        radii = [self.own.tool_radius, *(tool.radius for tool in self.tools)]
+        self.params = replace(self.own, tool_radius=radii[-1])
+        widest = replace(self.own, tool_radius=max(radii))
+        self.home = home_posture(self.volume, widest)
         self.body: Body = body_of(
             self.params, self.clearance, self.accuracy, X_WE=self.X_WE
         )
@@ -160,6 +175,14 @@ class Session:
         times = [channel.time for channel in self.volume.more]
         visits = np.arange(int(self.tree.size[1]))
         return np.searchsorted(np.array(times, int), visits, side="right")
+
+    @property
+    def tool_radii(self) -> NDArray[np.float64]:
+        """Of the ball that it carries at each posture of the plan, in m, (n,)."""
+        radii = np.array([self.own.tool_radius, *(t.radius for t in self.tools)])
+        times = np.array([tool.time for tool in self.tools], int)
+        visits = np.arange(int(self.tree.size[1]))
+        return radii[np.searchsorted(times, visits, side="right")]
 
     # What is asked -----------------------------------------------------------
 
@@ -179,7 +202,7 @@ class Session:
         """Makes a procedure part of the plan if it is feasible."""
         before = self.standing()
         answer = self._do(procedure)
-        if answer.feasible and procedure.tool is not None:
+        if answer.feasible and with_tool(self.params, procedure.tool) != self.params:
             answer = refused(
                 "limit", None, 0.0, "the robot carries another tool: change it first"
             )
@@ -203,7 +226,8 @@ class Session:
         self.concluded = ""
         self.volume.undo(step.first - 1)
         cut(self.tree, step.nodes, step.first)
-        if step.kind == ACCESS:
+        if step.kind in (ACCESS, TOOL):
+            self.tools = [tool for tool in self.tools if tool.time < step.first]
             roots = np.flatnonzero(self.tree.parent[: step.nodes] < 0)
             self.tree.size[2] = roots[-1]
             enlist_all(self.tree)
@@ -378,6 +402,30 @@ class Session:
         name = name or f"entry {1 + len(self.volume.more)}"
         return self.record(name, ACCESS, before)
 
+    def change_tool(self, radius: float, name: str = "") -> Step:
+        """Withdraws the robot and gives it a ball of another radius, in m.
+
+        Raises:
+            ValueError: If that is no tool of this robot.
+        """
+        params = with_tool(self.own, Tool(radius, self.own.tool_offset))
+        if radius >= self.volume.channel:
+            raise ValueError(
+                f"tool of {radius} m: expected < {self.volume.channel}, the channel's"
+            )
+        if self.steps and self.steps[-1].kind != "home":
+            self.go_home()
+        before = self.standing()
+        self.make_room()
+        back = home_posture(self.volume, params)
+        if back[0] < self.home[0]:
+            space, at = self.volume.space(), here(self.tree)
+            extend(space, self.body, self.tree, at, back, self.why)
+        self.tools.append(ToolChange(radius, int(self.tree.size[1])))
+        self._begin_at_home()
+        name = name or f"tool of {1e3 * radius:.1f} mm"
+        return self.record(name, TOOL, before)
+
     def _begin_at_home(self) -> None:
         """Lets a tree of its own begin at home: nothing driven before is relied on."""
         self.stand()
@@ -420,9 +468,8 @@ class Session:
 
     def thought(self) -> "Session":
         """The same as it stands now, to be gone on with without consequence."""
-        other = Session(
-            self.volume.thought(), self.params, self.clearance, self.accuracy
-        )
+        other = Session(self.volume.thought(), self.own, self.clearance, self.accuracy)
+        other.tools = list(self.tools)
         other.tree = copied(self.tree, ROOM, 4 * ROOM)
         other.steps = list(self.steps)
         other.stand()
@@ -443,6 +490,7 @@ class Session:
         self.volume.more = thought.volume.more
         self.volume.allow()
         self.volume.refresh()
+        self.tools = thought.tools
         self.stand()
         self.tree, self.steps = thought.tree, thought.steps
         self.concluded = ""
@@ -499,7 +547,8 @@ class Session:
             "notes": v.notes,
             "clearance": self.clearance,
             "accuracy": self.accuracy,
-            "params": asdict(self.params),
+            "params": asdict(self.own),
+            "tools": [asdict(tool) for tool in self.tools],
             "steps": [asdict(step) for step in self.steps],
             "concluded": self.concluded,
             "reached": self.reached,
@@ -563,6 +612,13 @@ def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
         ROOM,
         ROOM,
     )
+    for row in meta.get("tools", ()):
+        tool = ToolChange(float(row["radius"]), int(row["time"]))
+        with_tool(session.own, Tool(tool.radius, session.own.tool_offset))
+        if not 0 < tool.time < len(arrays["route"]):
+            raise ValueError(f"a tool at no visit: {tool.time}")
+        session.tools.append(tool)
+    session.stand()
     for row in meta["steps"]:
         row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
         session.steps.append(Step(**row))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import ToolPose, ToolTarget
 from plants.snake.tool_target import target_of
-from plants.tissue.tissue_carver import Entry
+from plants.tissue.tissue_carver import Entry, ToolBall
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check, parameter
@@ -238,6 +238,7 @@ class ProcedurePlayer(Block):
     Port ``reference`` emits the `ToolPose` of this instant.
     Port ``progress`` emits the `Progress`.
     Port ``entry`` emits the `Entry` of the posture last reached.
+    Port ``tool`` emits the `ToolBall` that it carries there.
     """
 
     def __init__(
@@ -248,6 +249,7 @@ class ProcedurePlayer(Block):
         first: int = 0,
         waits: NDArray[np.float64] | None = None,
         entries: ArrayLike | None = None,
+        radii: ArrayLike | None = None,
     ) -> None:
         """Makes the block for a plan.
 
@@ -260,6 +262,7 @@ class ProcedurePlayer(Block):
             waits: Time to be spent at each in s, (n,); none if None.
             entries: The channel through which each is reached, (n,); the first if
                 None.
+            radii: Of the tool's ball at each in m, (n,); the snake's own if None.
         """
         super().__init__()
         self._params = check(params or ProcedurePlayerParams())
@@ -277,6 +280,9 @@ class ProcedurePlayer(Block):
         waits = None if waits is None else waits[first:]
         entries = np.zeros(first + len(self._x)) if entries is None else entries
         self._entries = np.asarray(entries, float)
+        if radii is None:
+            radii = np.full(len(self._entries), self._snake.tool_radius)
+        self._radii = np.asarray(radii, float)
         self._profile = profile(self._x, self._params, waits)
         self._times = self._profile.times
         ticket = {self.time_ticket()}
@@ -284,6 +290,7 @@ class ProcedurePlayer(Block):
         self.signal_out("reference", ToolPose, self._calc_reference, ticket)
         self.signal_out("progress", Progress, self._calc_progress, ticket)
         self.signal_out("entry", Entry, self._calc_entry, ticket)
+        self.signal_out("tool", ToolBall, self._calc_tool, ticket)
 
     @property
     def duration(self) -> float:
@@ -314,3 +321,7 @@ class ProcedurePlayer(Block):
     def _calc_entry(self, context: Any) -> list[float]:
         (posture,) = self._calc_progress(context)
         return [float(self._entries[int(posture)])]
+
+    def _calc_tool(self, context: Any) -> list[float]:
+        (posture,) = self._calc_progress(context)
+        return [float(self._radii[int(posture)])]

@@ -1,12 +1,13 @@
 """A rehearsal on tissue that yields: rounds, what a scan is for, and when it stops."""
 
+from contextlib import contextmanager
 import json
 
 import pytest
 
 from diagrams.common.cli import main
 from diagrams.common.progress import silent
-from diagrams.resection.rehearsal import rehearse
+from diagrams.resection.rounds import rehearse
 from diagrams.studies import load_scenario
 
 QUICK = (
@@ -41,6 +42,32 @@ def test_where_nothing_moves_scans_do_no_harm():
     assert still.rounds[-1]["resected"] > 0.97 * still.reachable
     assert still.rounds[-1]["healthy"] < 0.01 and still.hits == 0
     assert all(row["error"] < 1e-3 for row in still.rounds[:-1])
+
+
+def test_killed_in_mid_round_it_goes_on_alike(tmp_path):
+    class Killed(BaseException):
+        """As by the system, in the third round."""
+
+    @contextmanager
+    def killing(what, unit):
+        yield lambda done, whole: None
+        if what == "round 3":
+            raise Killed
+
+    quick = [*QUICK, "rehearsal.most=10", "spacing=0.002"]
+    scenario = load_scenario("resect_auto_small", quick)
+    one, other = tmp_path / "one" / "state", tmp_path / "other" / "state"
+    with pytest.raises(Killed):
+        rehearse(scenario, killing, one)
+    assert one.is_file()
+    went_on = rehearse(scenario, silent, one)
+    assert went_on.figures() == rehearse(scenario, silent, other).figures()
+    assert len(went_on.rounds) > 3 and not one.is_file()
+    with pytest.raises(Killed):
+        rehearse(scenario, killing, one)
+    another = load_scenario("resect_auto_small", [*quick, "seed=2"])
+    with pytest.raises(ValueError, match="other parameters"):
+        rehearse(another, silent, one)
 
 
 def test_it_stops_when_more_moves_than_was_reckoned_with(tmp_path, capsys):

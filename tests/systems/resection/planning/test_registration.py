@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from systems.resection.planning.registration import Surface, registered, terms
+from systems.resection.planning.registration import Fit, Surface, registered, terms
 
 SIZE, SPACING = (40, 40, 40), 1e-3
 ORIGIN, RADIUS = np.full(3, -0.0195), 0.012
@@ -34,8 +34,10 @@ def fitted(w: float, noise: float = 0.0) -> tuple[float, float]:
     points += noise * rng.normal(size=points.shape)
     since = np.full(SIZE, w)
     seen = Surface(points, ball, since, max(noise, 1e-4))
-    found, rms = registered([seen], ORIGIN, SPACING, np.zeros(3), RADIUS, 3e-3)
+    middle, before = np.zeros(3), Fit().later(3e-3)
+    fit, rms = registered([seen], ORIGIN, SPACING, middle, RADIUS, before)
     assert rms < 0.3e-3 + noise
+    found = fit.displacement(middle, RADIUS)
     error = np.linalg.norm(found(on) - moved(on), axis=1)
     return float(np.median(error)), float(np.linalg.norm(moved(on), axis=1).max())
 
@@ -50,4 +52,4 @@ def test_fresh_cuts_say_nothing():
     error, most = fitted(0.0)
     assert error > 0.2 * most  # nothing but the prior is left
     with pytest.raises(ValueError):
-        registered([], ORIGIN, SPACING, np.zeros(3), RADIUS, 3e-3)
+        registered([], ORIGIN, SPACING, np.zeros(3), RADIUS, Fit().later(3e-3))

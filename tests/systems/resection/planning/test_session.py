@@ -21,6 +21,7 @@ from systems.resection.planning.next_entry import (
     channel_along,
     next_entries,
 )
+from systems.resection.planning.next_tool import ToolsParams, next_tools
 from systems.resection.planning.procedure import (
     Procedure,
     Tool,
@@ -218,6 +219,58 @@ def test_a_second_entry_bores_and_can_be_taken_back(tmp_path):
         assert session_.commit(
             Procedure("entry", length=0.012, radius=0.012, clipped=True)
         ).feasible
+
+
+def test_another_tool_is_carried_and_can_be_taken_back(tmp_path):
+    session = ball_session()
+    session.file = tmp_path / "t.session"
+    assert session.commit(ENTRY).feasible
+    tau, own = session.volume.tau.copy(), session.params.tool_radius
+    asked = Procedure("entry", length=0.012, radius=0.009, clipped=True)
+    asked.tool = Tool(own + 5e-4, session.params.tool_offset)
+    assert "change it first" in session.commit(asked).text
+    step = session.change_tool(own + 5e-4)
+    assert step.gained == 0.0 and session.body.radius > own
+    (change,) = session.tools
+    x = session.postures
+    np.testing.assert_array_equal(x[change.time], x[change.time - 1])  # it waits
+    assert x[change.time][0] == pytest.approx(x[0][0] - 5e-4)  # all of it is within
+    assert session.commit(asked).feasible
+    again = load_session(session.file)
+    assert again.tools == session.tools and again.params == session.params
+    np.testing.assert_array_equal(again.tool_radii, session.tool_radii)
+    assert set(session.tool_radii[: change.time]) == {own}
+    # What is carved with the tools that it carries is what was planned, and no more.
+    carving = Carving(session.volume, session.own)
+    for index in range(len(session.postures) - 1):
+        told = carving.move(
+            index, *session.postures[index : index + 2], 0.2e-3,
+            radius=float(session.tool_radii[index]),
+        )  # fmt: skip
+        assert told[2] == 0
+    planned = np.count_nonzero(session.volume.resected)
+    assert np.count_nonzero(carving.volume.resected) == pytest.approx(planned, rel=0.05)
+    for session_ in (session, again):
+        while len(session_.steps) > 1:
+            session_.undo()
+        assert session_.params.tool_radius == own and not session_.tools
+        np.testing.assert_array_equal(session_.volume.tau, tau)
+    with pytest.raises(ValueError, match="the channel's"):
+        session.change_tool(session.volume.channel)
+    with pytest.raises(ValueError, match="tool"):
+        session.change_tool(-1e-3)
+
+
+def test_a_smaller_tool_is_proposed_where_it_adds():
+    session = ball_session(2e-3)
+    session.commit(ENTRY)
+    own = session.params.tool_radius
+    params = ToolsParams(radii=[own, own + 5e-4, own - 1e-3], least_gain=0.0)
+    found = next_tools(session, params)
+    assert {tool.radius for tool in found} <= {own + 5e-4, own - 1e-3}
+    gains = [tool.gained for tool in found]
+    assert gains == sorted(gains, reverse=True) and all(gain >= 0 for gain in gains)
+    assert not session.tools and next_tools(session, ToolsParams(radii=[own])) == []
 
 
 def test_a_channel_beside_the_tumour_is_none():
