@@ -152,17 +152,20 @@ class PretensionControl(StepBlock):
         drive: SnakeDriveParams | None = None,
         drums: Drums | None = None,
     ) -> None:
-        """Makes the block for a drive, starting at what is wound out."""
+        """Makes the block for a drive; all wires are drawn taut by T_0 at the start."""
         super().__init__()
         params = check(params or PretensionControlParams())
         drive = check(drive or SnakeDriveParams())
+        taken = min(params.tension / drive.wire_stiffness, params.limit)
+        start = drums or example(Drums)
+        taut: Any = tuple(wire - taken for wire in start.wires)
         self.declare_update(
             _update,
             [packed(params, stiffness=drive.wire_stiffness)],
             {"command": Drums, "tension": Tensions, "noise": CellNoise},
             {
-                "_memory": np.append(np.zeros(ROPES), [np.nan] * ROPES + [0.0] * ROPES),
-                "drums": drums or example(Drums),
+                "_memory": np.repeat([taken, np.nan, 0.0], ROPES),
+                "drums": start._replace(wires=taut),
                 "cell": CellCode(float(Cell.GOOD), -1.0),
             },
             params.period,
