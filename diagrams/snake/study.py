@@ -13,10 +13,10 @@ from diagrams.snake.diagram import make_snake_diagram
 from diagrams.snake.live import LIVE
 from diagrams.snake.metrics import break_time, measure
 from diagrams.snake.plots import plots, turns_in
+from diagrams.snake.robot import STATICS_SIGNALS, is_free
 from diagrams.snake.scenario import SnakeScenario
 from diagrams.snake.wire_replay import animate_wires
-from plants.snake.signals import Drums, Stability, Tensions, ToolForce, ToolPose
-from systems.resection.wires.ball_location import BallAngles, Gaps
+from plants.snake.signals import Drums, Tensions, ToolPose
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
 from systems.resection.wires.wire_drums import Limited
@@ -34,12 +34,6 @@ SIGNALS = {
     "watch.alarm": Alarm,
 }
 PAPERS_SIGNALS = {"snake.coupler_error": CouplerError, "wires.residual": Residual}
-STATICS_SIGNALS = {
-    "snake.balls": BallAngles,
-    "snake.gaps": Gaps,
-    "wires.stability": Stability,
-    "tool.force": ToolForce,
-}
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
 LOG_PERIOD = 0.02
@@ -54,8 +48,7 @@ def integrator(scenario: SnakeScenario) -> SimulatorConfig:
 
 def signals(scenario: SnakeScenario) -> dict[str, Any]:
     """What is logged of a scenario."""
-    free = scenario.wires == "statics"
-    return SIGNALS | (STATICS_SIGNALS if free else PAPERS_SIGNALS)
+    return SIGNALS | (STATICS_SIGNALS if is_free(scenario) else PAPERS_SIGNALS)
 
 
 def decorate(meshcat: Any, animation: Any, run: Any) -> None:

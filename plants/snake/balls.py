@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.kinematics import put, turned
 from plants.snake.parameters import MODULES, SnakeParams
 from plants.snake.posture import Array, bends_of, whole_postures
 from systems.common.compiled import compiled
-from systems.common.geometry import norm
+from systems.common.geometry import along, norm
 
 BALLS = 2 * MODULES
 TURNS = 3 * BALLS
@@ -107,6 +108,28 @@ def turns_of_angles(angles: ArrayLike) -> Array:
         [sa * sc - ca * sb * cc, ca * sb * sc + sa * cc, ca * cb],
     ]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def ball_posture(x: ArrayLike) -> Array:
+    """s, then joints Rx, Ry, Rz a ball (19,), of a posture (7,)."""
+    return np.append(np.asarray(x, float)[0], angles_of(turns_of(x)))
+
+
+@compiled
+def ball_chain(
+    q: Any, h: float, tool: float, o: Any, e: Any, f: Any, n: Any, out: Any
+) -> None:
+    """As `kinematics.chain`, of free balls: s, then joints Rx, Ry, Rz a ball (19,)."""
+    p = along(o, q[0], n)
+    for i in range(BALLS):
+        put(p, out[i])
+        a, b, c = q[1 + 3 * i], q[2 + 3 * i], q[3 + 3 * i]
+        f, n = turned(f, n, math.cos(a), math.sin(a))
+        e, n = turned(e, n, math.cos(b), -math.sin(b))
+        e, f = turned(e, f, math.cos(c), math.sin(c))
+        p = along(p, 2 * h, n)
+    put(p, out[6])
+    put(along(p, tool, n), out[7])
 
 
 def corners_of(turns: Array, s: ArrayLike, params: SnakeParams) -> Array:

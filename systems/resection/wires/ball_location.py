@@ -7,7 +7,13 @@ import numpy as np
 from plants.snake.balls import BALLS, gaps, tool_pose, turns_of_angles
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array
-from plants.snake.signals import MODULE_NUMBERS, BallState, Numbers, ToolPose
+from plants.snake.signals import (
+    MODULE_NUMBERS,
+    BallPosture,
+    BallState,
+    Numbers,
+    ToolPose,
+)
 from systems.common.block import Block
 from systems.common.parameter import check
 from systems.common.signal import Field, flat, vector, view
@@ -55,6 +61,7 @@ class BallLocation(Block):
     """Where a snake of free balls truly is.
 
     Port ``state`` accepts the plant's `BallState`.
+    Port ``posture`` emits the `BallPosture`.
     Port ``bends`` emits the mean bend of each module's balls, `Bends`.
     Port ``tool`` emits the `ToolPose`.
     Port ``balls`` emits their `BallAngles`.
@@ -69,6 +76,7 @@ class BallLocation(Block):
         ticket = {self._state.ticket()}
         self._turns = self.cached("turns", self._calc_turns, ticket)
         known = {*ticket, self._turns.ticket()}
+        self.signal_out("posture", BallPosture, self._calc_posture, ticket)
         self.signal_out("bends", Bends, self._calc_bends, known)
         self.signal_out("tool", ToolPose, self._calc_tool, known)
         self.signal_out("balls", BallAngles, self._calc_balls, ticket)
@@ -76,6 +84,10 @@ class BallLocation(Block):
 
     def _calc_turns(self, context: Any) -> Array:
         return turns_of_angles(view(BallState, self._state.Eval(context)).q[1:])
+
+    def _calc_posture(self, context: Any) -> Array:
+        q: Array = view(BallState, self._state.Eval(context)).q
+        return q
 
     def _calc_bends(self, context: Any) -> Array:
         axes = self._turns.Eval(context)[:, :, 2]
