@@ -34,6 +34,7 @@ from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check, parameter, part
 from systems.common.signal import view
+from systems.resection.wires.tool_load import resisting
 from systems.resection.wires.tool_tracker import TrackedTool
 from systems.resection.wires.wire_inverse_actuation import (
     WireInverseActuationParams,
@@ -48,9 +49,6 @@ DAMPING = 3e-4
 """Of the step, in m/rad: singular directions are left alone."""
 MOST = np.array([0.01, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35])
 """By which a posture is moved at most."""
-SLOW = 1e-3
-"""Speed in m/s below which the model takes cutting to resist the
-less, the slower the tool is to be."""
 FRAMES = 16
 """Instants whose prediction is kept for frames that come late."""
 
@@ -63,6 +61,9 @@ class HysteresisCompensationParams:
     friction: SnakeFrictionParams = part(SnakeFrictionParams)
     cutting: float = parameter(
         0.0, "force that it takes to oppose the motion", "N", least=0.0, most=3.0
+    )
+    tissue: float = parameter(
+        60.0, "stiffness that it takes what is cut to have", "N/m", above=0, most=1e5
     )
     dither: float = parameter(
         0.0,
@@ -103,13 +104,6 @@ def aimed(x: Array, off: Array, snake: SnakeParams) -> Array:
     return step
 
 
-def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
-    """The model's force in N against a way (3,) in m that took some time in s."""
-    speed = np.linalg.norm(moved) / time
-    against: np.ndarray = -force / max(speed, SLOW) * moved / time
-    return against
-
-
 class Compensation(NamedTuple):
     """What is remembered from one period to the next.
 
@@ -117,6 +111,7 @@ class Compensation(NamedTuple):
         grip: What the model's friction holds on to, flat, (204,).
         x: The last posture asked for, (7,).
         shift: What it is wound for besides, (7,).
+        force: That the model takes the tool to feel, in N, (3,).
         bias: By which the tool is off the model, place and axis, (6,).
         said: The model's tool, of this instant and those before, (FRAMES, 6).
     """
@@ -124,11 +119,12 @@ class Compensation(NamedTuple):
     grip: Array
     x: Array
     shift: Array
+    force: Array
     bias: Array
     said: Array
 
 
-PARTS = np.cumsum([sum(map(math.prod, SHAPES)), 7, 7, 6])
+PARTS = np.cumsum([sum(map(math.prod, SHAPES)), 7, 7, 3, 6])
 """Where in the state a `Compensation`'s parts begin, but the first."""
 
 
@@ -168,7 +164,9 @@ class HysteresisCompensation(Block):
         x = np.array(posture, float)
         grip = self._model.at_rest(turns_of(x))
         said = np.tile(self._pose(grip.turns, x[0]), (FRAMES, 1))
-        start = Compensation(flat_grip(grip), x, np.zeros(7), np.zeros(6), said)
+        start = Compensation(
+            flat_grip(grip), x, np.zeros(7), np.zeros(3), np.zeros(6), said
+        )
         self.DeclareDiscreteState(np.concatenate([np.ravel(part) for part in start]))
         tickets = {
             self._posture.ticket(),
@@ -205,8 +203,8 @@ class HysteresisCompensation(Block):
     def _calc_next(self, context: Any) -> tuple[Array, Array]:
         """The next state, and the drums."""
         p, values = self._params, np.array(context.get_discrete_state(0).value())
-        grip_, x_, shift_, bias_, said_ = np.split(values, PARTS)
-        state = Compensation(grip_, x_, shift_, bias_, said_.reshape(FRAMES, 6))
+        *parts, said_ = np.split(values, PARTS)
+        state = Compensation(*parts, said_.reshape(FRAMES, 6))
         x = np.array(self._posture.Eval(context))
         x = x if np.isfinite(x).all() else state.x
         grip: Grip = grip_of(state.grip)
@@ -214,7 +212,8 @@ class HysteresisCompensation(Block):
         unused = np.empty((6, 7))
         h, tool = self._snake.half_pitch, self._snake.tool_offset
         wanted, last = (_poses(y, h, tool, 1e-7, unused) for y in (x, state.x))
-        force = opposing(p.cutting, wanted[:3] - last[:3], p.period)
+        moved = wanted[:3] - last[:3]
+        force = resisting(state.force, moved, p.tissue, p.cutting)
         turns = self._model.ahead(grip)
         shaken = p.dither * (-1.0) ** round(context.get_time() / p.period)
         for _ in range(p.steps):
@@ -229,5 +228,5 @@ class HysteresisCompensation(Block):
         if not np.isfinite(flat_grip(found.grip)).all():
             return values, self._wound(state.x + state.shift)
         memory = np.vstack([said, state.said[:-1]])
-        after = Compensation(flat_grip(found.grip), x, shift, bias, memory)
+        after = Compensation(flat_grip(found.grip), x, shift, force, bias, memory)
         return np.concatenate([np.ravel(part) for part in after]), drums

@@ -18,7 +18,11 @@ from systems.resection.wires.hysteresis_compensation import (
     HysteresisCompensationParams,
     aimed,
 )
-from systems.resection.wires.tool_load import ToolLoad, ToolLoadParams
+from systems.resection.wires.tool_load import (
+    ToolLoad,
+    ToolLoadParams,
+    resisting,
+)
 from systems.resection.wires.tool_tracker import ToolTracker, ToolTrackerParams
 from systems.resection.wires.wire_inverse_actuation import WireInverseActuationParams
 
@@ -42,21 +46,24 @@ def tick(dut, context):
     context.SetTime(context.get_time() + 0.02)
 
 
-def errors(own, tracked=False):
-    """Of the tool in m, wound for by a model of its own friction."""
-    params = HysteresisCompensationParams(friction=own)
+def errors(own, tracked=False, load=0.0, cutting=0.0):
+    """Of the tool in m, wound for by a model of its own friction and tissue."""
+    params = HysteresisCompensationParams(friction=own, cutting=cutting)
     dut = HysteresisCompensation(params, WOUND, PARAMS, DRIVE, CORE)
     context = dut.CreateDefaultContext()
     snake = Statics(PARAMS, DRIVE, CORE, friction=ROUGH)
     turns, grip, off, seen = turns_of(np.zeros(7)), None, [], None
+    force, place = np.zeros(3), forward(np.zeros(7), PARAMS)[:3, 3]
     for x in swing():
         dut.GetInputPort("posture").FixValue(context, x)
         if tracked and seen is not None:
             dut.GetInputPort("measured").FixValue(context, seen)
         drums = dut.GetOutputPort("drums").Eval(context)
-        found = snake.equilibrium(turns, wound=drums[:9], grip=grip)
+        found = snake.equilibrium(turns, wound=drums[:9], force=force, grip=grip)
         turns, grip = found.turns, found.grip
         X_WT = tool_pose(turns, drums[9], PARAMS)
+        force = resisting(force, X_WT[:3, 3] - place, 60.0, load)
+        place = X_WT[:3, 3]
         tick(dut, context)
         seen = [*X_WT[:3, 3], *X_WT[:3, 2], context.get_time()]
         off.append(np.linalg.norm(X_WT[:3, 3] - forward(x, PARAMS)[:3, 3]))
@@ -71,6 +78,12 @@ def test_a_right_model_takes_the_error_away_and_tracking_helps_a_wrong_one():
     assert right.max() < wrong.max() < 0.5 * none.max()
     tracked = errors(SnakeFrictionParams(), tracked=True)
     assert tracked[-1] < 0.3 * none[-1]
+
+
+def test_a_model_that_draws_tissue_along_knows_the_force_when_the_tool_turns_back():
+    none, known = (errors(ROUGH, load=0.3, cutting=own) for own in (0.0, 0.3))
+    assert known.max() < 0.3 * none.max()
+    assert known[-1] < 0.3 * none[-1]  # it stands, and tissue still pulls
 
 
 def test_a_posture_is_moved_as_far_as_the_tool_is_off():
