@@ -77,6 +77,15 @@ def gaps(turns: Array) -> tuple[Array, Array]:
     return split, torsion
 
 
+def mean_bends(turns: Array) -> Array:
+    """alpha1, beta1, ..., beta3 (6,) of modules, between those of their two balls."""
+    axes = turns[:, :, 2]
+    mean = axes[0::2] + axes[1::2]
+    alpha = np.arctan2(mean[:, 1], mean[:, 0])
+    beta = np.arctan2(np.hypot(mean[:, 0], mean[:, 1]), mean[:, 2])
+    return np.column_stack([alpha, beta]).ravel()
+
+
 def tool_pose(turns: Array, s: float, params: SnakeParams) -> Array:
     """X_WT (4, 4) of balls that turn by R_i (6, 3, 3) at a translation s."""
     X = np.eye(4)

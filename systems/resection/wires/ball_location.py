@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.balls import BALLS, gaps, tool_pose, turns_of_angles
+from plants.snake.balls import BALLS, gaps, mean_bends, tool_pose, turns_of_angles
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array
 from plants.snake.signals import (
@@ -90,12 +90,8 @@ class BallLocation(Block):
         return q
 
     def _calc_bends(self, context: Any) -> Array:
-        axes = self._turns.Eval(context)[:, :, 2]
-        mean = axes[0::2] + axes[1::2]
-        alpha = np.arctan2(mean[:, 1], mean[:, 0])
-        beta = np.arctan2(np.hypot(mean[:, 0], mean[:, 1]), mean[:, 2])
         s = view(BallState, self._state.Eval(context)).q[0]
-        return np.append(s, np.column_stack([alpha, beta]))
+        return np.append(s, mean_bends(self._turns.Eval(context)))
 
     def _calc_tool(self, context: Any) -> Array:
         s = float(view(BallState, self._state.Eval(context)).q[0])

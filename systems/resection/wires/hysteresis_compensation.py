@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.balls import tool_pose, turns_of
+from plants.snake.balls import mean_bends, tool_pose, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.friction import (
@@ -25,7 +25,7 @@ from plants.snake.friction import (
     grip_of,
 )
 from plants.snake.parameters import SnakeParams
-from plants.snake.posture import Array
+from plants.snake.posture import Array, posture_of
 from plants.snake.signals import REST, Drums, Posture
 from plants.snake.statics import Statics
 from plants.snake.statics_kernels import Grip
@@ -94,13 +94,26 @@ def _poses(x: Any, h: float, tool: float, step: float, J: Any) -> Array:
     return rows[7]
 
 
-def aimed(x: Array, off: Array, snake: SnakeParams) -> Array:
-    """By how much to move a posture (7) so that the tool's pose moves by `off` (6)."""
+def aimed(x: Array, off: Array, astray: Array, snake: SnakeParams) -> Array:
+    """By how much to move a posture so that its tool's pose moves by `off`.
+
+    The two freedoms that are left move the posture by `astray`: nothing else leads the
+    body, and steps of the tool alone would add up in them.
+
+    Args:
+        x: The posture, (7,).
+        off: Of the tool, place and axis, (6,).
+        astray: Of the posture, (7,).
+        snake: Geometry.
+    """
     J, weight = np.empty((6, 7)), np.repeat([1.0, LEVER], 3)
     _poses(x, snake.half_pitch, snake.tool_offset, 1e-7, J)
     A = weight[:, None] * J * SCALE
-    solved = np.linalg.solve(A @ A.T + DAMPING**2 * np.eye(6), weight * off)
-    step: Array = SCALE * (A.T @ solved)
+    rest = astray / SCALE
+    damped = A @ A.T + DAMPING**2 * np.eye(6)
+    step: Array = SCALE * (
+        rest + A.T @ np.linalg.solve(damped, weight * off - A @ rest)
+    )
     return step
 
 
@@ -223,7 +236,9 @@ class HysteresisCompensation(Block):
             found = self._model.equilibrium(turns, wound=wound, force=force, grip=grip)
             turns = found.turns
             said = self._pose(found.turns, x[0] + shift[0])
-            step = aimed(x + shift, wanted - bias - said, self._snake)
+            bends = np.append(x[0] + shift[0], mean_bends(found.turns))
+            off, astray = wanted - bias - said, x - posture_of(bends)
+            step = aimed(x + shift, off, astray, self._snake)
             shift = np.clip(shift + step, -MOST, MOST)
         if not np.isfinite(flat_grip(found.grip)).all():
             return values, self._wound(state.x + state.shift)

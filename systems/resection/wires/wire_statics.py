@@ -10,6 +10,7 @@ from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.friction import SnakeFrictionParams, flat_grip, grip_of
 from plants.snake.parameters import SnakeParams
+from plants.snake.posture import Array
 from plants.snake.signals import (
     REST,
     DrumRates,
@@ -21,10 +22,15 @@ from plants.snake.signals import (
 )
 from plants.snake.snake import BALL_POSITIONS
 from plants.snake.statics import Equilibrium, Statics
+from plants.snake.statics_kernels import ROPES, Grip
 from systems.common.block import Block
 from systems.common.signal import Field, flat, view
 
 NOWHERE = (0.0,) * BALL_POSITIONS
+
+
+STEPS = 16
+"""In which a period is gone through again to see whether the snake leaps."""
 
 
 class BallSetPoint(NamedTuple):
@@ -32,6 +38,29 @@ class BallSetPoint(NamedTuple):
 
     x: Annotated[Numbers, Field("m, rad", "s, then Rx, Ry, Rz a ball", NOWHERE)]
     v: Annotated[Numbers, Field("m/s, rad/s", "their rates, always zero", NOWHERE)]
+
+
+def leaps(statics: Statics, grip: Grip, before: Array, now: Array) -> bool:
+    """Whether the snake leaps between two instants: most of its way at once.
+
+    The search for a distant equilibrium can lead over states in which the snake could
+    not stay, though on its own way there it does.
+
+    Args:
+        statics: The snake.
+        grip: What it holds on to at first.
+        before: Wound lengths and force on the tool then, (12,).
+        now: The same at the end.
+    """
+    ways: list[float] = []
+    for share in np.arange(1, STEPS + 1) / STEPS:
+        wound, force = np.split(before + share * (now - before), [len(before) - 3])
+        found = statics.equilibrium(grip.turns, wound=wound, force=force, grip=grip)
+        if not found.stable:
+            return True
+        ways.append(float(np.abs(found.turns - grip.turns).max()))
+        grip = found.grip
+    return max(ways) > 0.5 * sum(ways)
 
 
 class WireStatics(Block):
@@ -75,9 +104,12 @@ class WireStatics(Block):
         self._lengths = self.signal_in("lengths", Drums)
         self._rates = self.signal_in("rates", DrumRates)
         self._force = self.signal_in("force", ToolForce)
-        # What friction holds on to, R_i among it, and s at the last update.
+        # What friction holds on to, R_i among it, and at the last update s, then
+        # lengths and force, which are not known at first.
         start = flat_grip(self._statics.at_rest(turns_of(posture)))
-        self.DeclareDiscreteState(np.append(start, np.asarray(posture, float)[0]))
+        s, unknown = np.asarray(posture, float)[:1], np.full(ROPES + 3, np.nan)
+        self.DeclareDiscreteState(np.concatenate([start, s]))
+        self.DeclareDiscreteState(unknown)
         ports = {port.ticket() for port in (self._lengths, self._rates, self._force)}
         self._found = self.cached("found", self._calc_found, ports | {self.xd_ticket()})
         found = {self._found.ticket()}
@@ -86,20 +118,28 @@ class WireStatics(Block):
         )
         self.signal_out("tension", Tensions, self._calc_tension, found)
         self.signal_out("stability", Stability, self._calc_stability, found)
-        self.update_every(period, self._calc_next)
+        self.update_every(period, lambda c: [self._calc_next(c), self._acting(c)])
 
-    def _calc_found(self, context: Any) -> Equilibrium:
-        """The equilibrium a lead later, downhill from that of the last update."""
+    def _acting(self, context: Any) -> Array:
+        """Lengths a lead later and the force on the tool, (12,)."""
         drums = view(Drums, self._lengths.Eval(context))
         rates = view(DrumRates, self._rates.Eval(context))
-        last = grip_of(context.get_discrete_state(0).value()[:-1])
         wound = drums.wires + self._lead * rates.wires
         if not np.isfinite(wound).all():  # infinitely long is not slack
             wound = np.full_like(wound, np.nan)
-        force = self._force.Eval(context)
+        return np.concatenate([wound, self._force.Eval(context)])
+
+    def _calc_found(self, context: Any) -> Equilibrium:
+        """The equilibrium a lead later, downhill from that of the last update."""
+        last = grip_of(context.get_discrete_state(0).value()[:-1])
+        acting = self._acting(context)
+        wound, force = np.split(acting, [ROPES])
         found = self._statics.equilibrium(
             self._statics.ahead(last), wound=wound, force=force, grip=last
         )
+        if found.buckled and found.stable:
+            before = context.get_discrete_state(1).value()
+            found = found._replace(buckled=leaps(self._statics, last, before, acting))
         # Out of balance it falls downhill, as far as the search goes.
         if np.isfinite(flat_grip(found.grip)).all():
             return found

@@ -89,8 +89,18 @@ def test_a_model_that_draws_tissue_along_knows_the_force_when_the_tool_turns_bac
 def test_a_posture_is_moved_as_far_as_the_tool_is_off():
     x = posture_of([0.01, 0.4, 0.3, -1.2, 0.3, 2.5, 0.3])
     off = np.array([1e-4, -5e-5, 8e-5, 0.0, 0.0, 0.0])
-    moved = forward(x + aimed(x, off, PARAMS), PARAMS) - forward(x, PARAMS)
+    moved = forward(x + aimed(x, off, 0 * x, PARAMS), PARAMS) - forward(x, PARAMS)
     np.testing.assert_allclose(moved[:3, 3], off[:3], atol=3e-6)
+    # What moves no tool leads the body back.
+    astray = 0.01 * redundant(x)
+    np.testing.assert_allclose(aimed(x, 0 * off, astray, PARAMS), astray, atol=2e-4)
+
+
+def redundant(x):
+    """A unit vector along which a posture leaves the tool's pose as it is."""
+    pose = [np.ravel(forward(x + d, PARAMS)[:3, 2:]) for d in 1e-6 * np.eye(7)]
+    J = (np.array(pose) - np.ravel(forward(x, PARAMS)[:3, 2:])) / 1e-6
+    return np.linalg.svd(J.T)[2][-1]
 
 
 @pytest.mark.parametrize("port", ["posture", "measured"])
