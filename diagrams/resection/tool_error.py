@@ -50,7 +50,7 @@ def planned_balls(case: Operation, times: Floats) -> Floats:
 
 
 def stray(run: Any) -> Floats:
-    """By how much the balls of a run were off their plan, (n, 19), at its log's times."""
+    """How far the balls of a run were off their plan, (n, 19), at its log's times."""
     true = np.column_stack([run.snake.posture.q[:, 0], run.snake.balls.q])
     return true - planned_balls(run.case, run.signals["time"])
 

@@ -52,9 +52,7 @@ def report(seed: int = 1, scenes: int = 0) -> str:
     PICTURE.parent.mkdir(exist_ok=True)
     save_figure(error_figure(told), PICTURE)
     body, tool = 1e3 * kept
-    lines = [
-        f"  95 % of the time body within {body:.2f}, tool {tool:.2f} mm; {PICTURE}"
-    ]
+    lines = [f"  95 % of the time body within {body:.2f} mm, tool {tool:.2f} mm"]
     for name, rows in told.items():
         lines.append(f"  {name}: tool error mm, executed, healthy, contact %; depth mm")
         for row in rows:
@@ -64,4 +62,4 @@ def report(seed: int = 1, scenes: int = 0) -> str:
                 + "".join(f"{share:9.2f}" for share in shares)
                 + f"{1e3 * row.depth:9.2f}"
             )
-    return "\n".join(lines)
+    return "\n".join([*lines, f"  {PICTURE}"])

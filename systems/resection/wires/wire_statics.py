@@ -30,7 +30,7 @@ NOWHERE = (0.0,) * BALL_POSITIONS
 
 
 STEPS = 16
-"""In which a period is gone through again to see whether the snake leaps."""
+"""In which a period is gone through again to see whether the snake buckles."""
 
 
 class BallSetPoint(NamedTuple):
@@ -41,10 +41,11 @@ class BallSetPoint(NamedTuple):
 
 
 def leaps(statics: Statics, grip: Grip, before: Array, now: Array) -> bool:
-    """Whether the snake leaps between two instants: most of its way at once.
+    """Whether the snake buckles between two instants, seen in small steps.
 
     The search for a distant equilibrium can lead over states in which the snake could
-    not stay, though on its own way there it does.
+    not stay, though on its own way there it does. It buckles if in a small step the
+    search does so, too, and the snake goes more than twice that step's share.
 
     Args:
         statics: The snake.
@@ -52,15 +53,16 @@ def leaps(statics: Statics, grip: Grip, before: Array, now: Array) -> bool:
         before: Wound lengths and force on the tool then, (12,).
         now: The same at the end.
     """
-    ways: list[float] = []
-    for share in np.arange(1, STEPS + 1) / STEPS:
-        wound, force = np.split(before + share * (now - before), [len(before) - 3])
+    ways, astray = np.zeros(STEPS), np.zeros(STEPS, bool)
+    for k in range(STEPS):
+        acting = before + (k + 1) / STEPS * (now - before)
+        wound, force = np.split(acting, [ROPES])
         found = statics.equilibrium(grip.turns, wound=wound, force=force, grip=grip)
         if not found.stable:
             return True
-        ways.append(float(np.abs(found.turns - grip.turns).max()))
-        grip = found.grip
-    return max(ways) > 0.5 * sum(ways)
+        ways[k] = np.abs(found.turns - grip.turns).max()
+        astray[k], grip = found.buckled, found.grip
+    return bool((astray & (ways > 2.0 * ways.mean())).any())
 
 
 class WireStatics(Block):
