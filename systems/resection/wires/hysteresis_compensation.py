@@ -216,8 +216,9 @@ class HysteresisCompensation(Block):
     def _calc_next(self, context: Any) -> tuple[Array, Array]:
         """The next state, and the drums."""
         p, values = self._params, np.array(context.get_discrete_state(0).value())
-        *parts, said_ = np.split(values, PARTS)
-        state = Compensation(*parts, said_.reshape(FRAMES, 6))
+        grip_, x_, shift_, force_, bias_, said_ = np.split(values, PARTS)
+        said = said_.reshape(FRAMES, 6)
+        state = Compensation(grip_, x_, shift_, force_, bias_, said)
         x = np.array(self._posture.Eval(context))
         x = x if np.isfinite(x).all() else state.x
         grip: Grip = grip_of(state.grip)
