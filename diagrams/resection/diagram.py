@@ -63,7 +63,7 @@ def make_blocks(case: Operation) -> dict[str, Any]:
             replace(s.carver, period=s.period),
             s.snake,
             Carving(case.session.volume, s.snake, done),
-            ball_posture(start) if is_free(s) else start,
+            ball_posture(start).tolist() if is_free(s) else start,
         ),
     }
 
