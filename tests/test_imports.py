@@ -139,6 +139,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.resection.planned",
         "diagrams.resection.rounds",
         "diagrams.resection.study",
+        "diagrams.resection.tool_error",
     }
 
 

@@ -96,6 +96,7 @@ FIGURES = {
     "ik_refused": Figure("%", "share of poses without a posture"),
     "drums_limited": Figure("%", "share of the time with a drum at its limit"),
     "phases": Figure("", "each phase: when, and why it was entered"),
+    "max_body_error": Figure("m", "greatest of the snake's body from its plan"),
     # navigation
     "collided": Figure("", "whether the robot touched anything"),
     "min_clearance": Figure("m", "least gap to an obstacle"),

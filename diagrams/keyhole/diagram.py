@@ -16,7 +16,7 @@ from diagrams.gauze import diagram as gauze
 from diagrams.gauze.theatre import add_theatre
 from diagrams.keyhole.operation import KeyholeCase
 from diagrams.keyhole.scenario import KeyholeScenario
-from diagrams.snake.diagram import DRUM_WIRES, WIRES, drum_chain
+from diagrams.snake.robot import DRUM_WIRES, WIRES, drum_chain
 from plants.abdomen.organ_motion import add_organ_motion, organ_trajectory
 from plants.instruments.tube import TubeParams, channel_frame
 from plants.snake.snake import Snake, add_snake, set_default_posture
@@ -75,7 +75,7 @@ KEYHOLE_WIRES = (
     ("tube_location.tube", "snake_task.tube"),
     ("organ_estimator.ahead", "snake_task.organ"),
     ("snake_task.target", "resection_ik.target"),
-    *(wire for wire in WIRES if not wire[0].startswith("tip_reference")),
+    *WIRES,
     *DRUM_WIRES,
     # What is true of it in the organ.
     ("snake_location.posture", "snake_in_organ.posture"),

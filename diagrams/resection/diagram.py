@@ -9,7 +9,14 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.resection.operation import Operation
-from diagrams.snake.diagram import DRUM_WIRES, WIRES, drum_chain
+from diagrams.snake.robot import (
+    is_free,
+    joints,
+    snake_chain,
+    snake_exports,
+    snake_wires,
+)
+from plants.snake.balls import ball_posture
 from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
 from plants.tissue.tissue_carver import Carving, TissueCarver
@@ -17,8 +24,6 @@ from systems.resection.wires.procedure_player import ProcedurePlayer
 
 RESECTION_WIRES = (
     ("procedure_player.target", "resection_ik.target"),
-    *(wire for wire in WIRES if not wire[0].startswith("tip_reference")),
-    *DRUM_WIRES,
     # What the tool's true path removes.
     ("snake_location.posture", "tissue_carver.posture"),
     ("procedure_player.entry", "tissue_carver.entry"),
@@ -32,7 +37,6 @@ EXPORTS = {
     "snake.posture": "snake_location.bends",
     "ik.status": "resection_ik.status",
     "drums.limited": "wire_drums.limited",
-    "wires.tension": "wire_tension.tension",
     "tissue.index": "tissue_carver.index",
     "tissue.removed": "tissue_carver.removed",
     "tissue.touched": "tissue_carver.touched",
@@ -47,7 +51,7 @@ def make_blocks(case: Operation) -> dict[str, Any]:
     s, postures, done = case.scenario, case.session.postures, case.done
     start = postures[done.posture].tolist()
     return {
-        **drum_chain(s, s.snake, start),
+        **snake_chain(s, s.snake, start),
         "procedure_player": ProcedurePlayer(
             replace(s.player, lead=s.period),
             s.snake,
@@ -61,7 +65,7 @@ def make_blocks(case: Operation) -> dict[str, Any]:
             replace(s.carver, period=s.period),
             s.snake,
             Carving(case.session.volume, s.snake, done),
-            start,
+            ball_posture(start).tolist() if is_free(s) else start,
         ),
     }
 
@@ -84,12 +88,24 @@ def make_resection_diagram(
     scenario, session = case.scenario, case.session
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
-    snake = add_snake(plant, plant.world_frame(), scenario.snake, scenario.drive)
+    snake = add_snake(
+        plant,
+        plant.world_frame(),
+        scenario.snake,
+        scenario.drive,
+        joints=joints(scenario),
+    )
     draw_channel(plant, plant.world_body(), session.volume.channel)
     plant.Finalize()
     set_default_posture(plant, snake, session.postures[case.done.posture])
     blocks = add_blocks(builder, make_blocks(case), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
+    wires, exports = snake_wires(scenario), snake_exports(scenario)
     return finish(
-        builder, "resection", systems, RESECTION_WIRES, EXPORTS, case.scenario.faults
+        builder,
+        "resection",
+        systems,
+        RESECTION_WIRES + wires,
+        EXPORTS | exports,
+        scenario.faults,
     )

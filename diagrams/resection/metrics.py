@@ -1,15 +1,20 @@
 """The figures of a resection: what was planned, and what was really done."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from diagrams.snake.robot import ball_figures, is_free
+from plants.snake.balls import corners_of, turns_of_angles
+from plants.snake.kinematics import centreline
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL
 from plants.tissue.space import SOLID
 from systems.resection.planning.next_entry import bored_healthy
 from systems.resection.planning.session import STROKES, Session
+from systems.resection.wires.procedure_player import played, profile
 
 
 def carving_of(run: Any) -> Any:
@@ -44,6 +49,31 @@ def single_step_share(runs: list[NDArray]) -> float:
     whole = sum(float(run.sum()) for run in runs)
     single = sum(float(run[0]) for run in runs if len(run) == 1)
     return single / whole if whole > 0.0 else 0.0
+
+
+def body_error(run: Any) -> NDArray:
+    """How far the snake is from where it is to be, each corner in m, (n, 8).
+
+    The corners are six ball centres, O3 and the tool, `plants.snake.balls.corners_of`.
+    """
+    case, scenario = run.case, run.scenario
+    first = case.done.posture
+    x, waits = case.session.postures[first:], case.waits[first:]
+    player = replace(scenario.player, lead=scenario.period)
+    plan = profile(x, player, waits)
+    wanted = np.array([played(x, plan, player, t) for t in run.signals["time"]])
+    s, turns = run.snake.posture.q[:, 0], turns_of_angles(run.snake.balls.q)
+    true = corners_of(turns, s, scenario.snake)
+    error: NDArray = np.linalg.norm(true - centreline(wanted, scenario.snake), axis=2)
+    return error
+
+
+def _free(run: Any) -> dict[str, Any]:
+    """What is told of a snake of free balls besides."""
+    return {
+        "max_body_error": float(body_error(run)[:, :-1].max()),
+        **ball_figures(run),
+    }
 
 
 def measure(run: Any) -> dict[str, Any]:
@@ -85,6 +115,7 @@ def measure(run: Any) -> dict[str, Any]:
         "path_length": float(run.tissue.way.length[-1]),
         "max_tool_error": float(error.max()),
         "rms_tool_error": float(np.sqrt(np.mean(error**2))),
+        **(_free(run) if is_free(run.scenario) else {}),
         "refusals": run.case.refusals,
         "unreached": [
             {"volume": lump.volume, "where": lump.where, "reason": lump.reason}

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from diagrams.common.scenario import Scenario
+from diagrams.snake.robot import FreeBallsParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.tissue.mask_labels import MaskLabels
@@ -51,7 +52,7 @@ class RehearsalParams:
 
 
 @dataclass
-class ResectionScenario(Scenario):
+class ResectionScenario(FreeBallsParams, Scenario):
     """Martin et al., section V: a tumour is resected by a sequence of procedures.
 
     `duration` is the longest; the run ends when the plan has been carried out.
@@ -117,6 +118,12 @@ class ResectionScenario(Scenario):
         least=1e-3,
         most=0.1,
     )
+    wires: str = parameter(
+        "drums",
+        "as stiff as their drums, the paper's ideal; or statics, in which each ball "
+        "turns as wires, core, friction and load have it",
+        choices=("drums", "statics"),
+    )
     snake: SnakeParams = part(SnakeParams)
     drive: SnakeDriveParams = part(SnakeDriveParams)
     player: ProcedurePlayerParams = part(ProcedurePlayerParams)
@@ -131,7 +138,8 @@ class ResectionScenario(Scenario):
     rehearsal: RehearsalParams = part(RehearsalParams)
 
     def rules(self) -> Rules:
-        """Procedures are the robot's, and files are there."""
+        """Procedures are the robot's, files are there, and wires know their load."""
+        yield from super().rules()
         for index, procedure in enumerate(self.procedures):
             check_procedure(procedure, self.snake, f"procedures[{index}]")
         for name in ("mask", "image"):

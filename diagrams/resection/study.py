@@ -18,6 +18,7 @@ from diagrams.resection.operation import (
 from diagrams.resection.plots import plots
 from diagrams.resection.replay import decorate
 from diagrams.resection.scenario import ResectionScenario
+from diagrams.snake.robot import STATICS_SIGNALS, is_free
 from plants.snake.signals import ToolPose
 from plants.tissue.execution import save_execution
 from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
@@ -41,6 +42,12 @@ SIGNALS = {
     "tissue.way": Way,
     "watch.alarm": Alarm,
 }
+
+
+def signals(scenario: ResectionScenario) -> dict[str, Any]:
+    """What is logged of a scenario."""
+    return SIGNALS | (STATICS_SIGNALS if is_free(scenario) else {})
+
 
 SAVE_EVERY = 5.0
 """Least wall time in s between two savings of what has been carried out."""
@@ -67,7 +74,7 @@ STUDY = Study(
     scenario=ResectionScenario,
     make_diagram=make_resection_diagram,
     measure=measure,
-    signals=lambda scenario: SIGNALS,
+    signals=signals,
     log_period=LOG_PERIOD,
     plots=plots,
     decorate=decorate,

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.snake.robot import ball_figures, is_free
 from systems.resection.wires.tip_reference import turned
 
 SETTLED = 0.3
@@ -59,7 +60,7 @@ def measure(run: Any) -> dict[str, Any]:
         "max_pose_error": float(position.max()) if some else None,
         "rms_pose_error": float(np.sqrt(np.mean(position**2))) if some else None,
         "max_axis_error": float(angle.max()) if some else None,
-        **_balls(run, alarm, lost),
+        **_balls(run),
         **_interval(run),
         **_felt(run),
         "min_tension": float(tension.min()),
@@ -70,20 +71,16 @@ def measure(run: Any) -> dict[str, Any]:
     }
 
 
-def _balls(run: Any, alarm: float, lost: bool) -> dict[str, Any]:
+def _balls(run: Any) -> dict[str, Any]:
     """How far the balls of a module part, and whether the snake stayed."""
-    if run.scenario.wires != "statics":
+    if not is_free(run.scenario):
         return {"max_coupler_error": float(run.snake.coupler_error.angle.max())}
-    gaps, (error, _) = run.snake.gaps, errors(run)
+    error, _ = errors(run)
     return {
         "rms_tool_error": float(np.sqrt(np.mean(error**2))),
         "max_tool_error": float(error.max()),
-        "max_split": float(gaps.split.max()),
-        "max_torsion": float(np.abs(gaps.torsion).max()),
-        "least_eigenvalue": float(run.wires.stability.least_eigenvalue.min()),
+        **ball_figures(run),
         "loop_width": loop_width(run),
-        "buckled_at": alarm if lost else None,
-        "stops": int(alarm >= 0.0),
     }
 
 

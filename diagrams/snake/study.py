@@ -13,15 +13,13 @@ from diagrams.snake.diagram import make_snake_diagram
 from diagrams.snake.live import LIVE
 from diagrams.snake.metrics import break_time, measure
 from diagrams.snake.plots import plots, turns_in
+from diagrams.snake.robot import STATICS_SIGNALS, is_free
 from diagrams.snake.scenario import SnakeScenario
+from diagrams.snake.sensing import SIGNALS_OF, chosen
 from diagrams.snake.wire_replay import animate_wires
-from plants.snake.signals import Drums, Stability, Tensions, ToolForce, ToolPose
-from systems.resection.wires.ball_location import BallAngles, Gaps
-from systems.resection.wires.contact_watch import Contact
-from systems.resection.wires.pretension_control import CellCode
+from plants.snake.signals import Drums, Tensions, ToolPose
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends, CouplerError
-from systems.resection.wires.tension_estimator import TensionInterval
 from systems.resection.wires.wire_drums import Limited
 from systems.resection.wires.wire_forward_actuation import Residual
 from systems.resection.wires.wire_watch import Alarm
@@ -37,17 +35,6 @@ SIGNALS = {
     "watch.alarm": Alarm,
 }
 PAPERS_SIGNALS = {"snake.coupler_error": CouplerError, "wires.residual": Residual}
-STATICS_SIGNALS = {
-    "snake.balls": BallAngles,
-    "snake.gaps": Gaps,
-    "wires.stability": Stability,
-    "tool.force": ToolForce,
-}
-OPTION_SIGNALS: dict[str, dict[str, Any]] = {
-    "estimate": {"wires.tip_tension": Tensions, "wires.interval": TensionInterval},
-    "control_pretension": {"cells.code": CellCode},
-    "feel": {"base.contact": Contact},
-}
 FRAME_RATE = 10.0
 """Meshcat interpolates between frames, and 108 pieces of wire are drawn in each."""
 LOG_PERIOD = 0.02
@@ -62,10 +49,9 @@ def integrator(scenario: SnakeScenario) -> SimulatorConfig:
 
 def signals(scenario: SnakeScenario) -> dict[str, Any]:
     """What is logged of a scenario."""
-    free = scenario.wires == "statics"
-    known = SIGNALS | (STATICS_SIGNALS if free else PAPERS_SIGNALS)
-    for key, more in OPTION_SIGNALS.items():
-        known = known | (more if getattr(scenario, key) else {})
+    known = SIGNALS | (STATICS_SIGNALS if is_free(scenario) else PAPERS_SIGNALS)
+    for key in chosen(scenario):
+        known = known | SIGNALS_OF[key]
     return known
 
 

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from plants.snake.kinematics import put, turned
 from plants.snake.parameters import MODULES, SnakeParams
-from plants.snake.posture import Array, bends_of, whole_postures
+from plants.snake.posture import Array, bends_of, module_angles, whole_postures
 from systems.common.compiled import compiled
 from systems.common.geometry import Vector, along, norm
 
@@ -80,6 +81,27 @@ def gaps(turns: Array) -> tuple[Array, Array]:
     return split, torsion
 
 
+@compiled
+def mean_bends(turns: Any) -> Any:
+    """alpha1, beta1, ..., beta3 (6,) of modules, between those of their two balls."""
+    bends = np.empty(2 * MODULES)
+    for k in range(MODULES):
+        x, y, z = turns[2 * k, :, 2] + turns[2 * k + 1, :, 2]
+        bends[2 * k] = math.atan2(y, x)
+        bends[2 * k + 1] = math.atan2(math.hypot(x, y), z)
+    return bends
+
+
+@compiled
+def mean_posture(turns: Any, s: float) -> Any:
+    """The posture (7,) of balls that turn by R_i, as if a module's were alike."""
+    x, bends = np.empty(1 + 2 * MODULES), mean_bends(turns)
+    x[0] = s
+    for k in range(MODULES):
+        x[2 * k + 1], x[2 * k + 2] = module_angles(bends[2 * k], bends[2 * k + 1])
+    return x
+
+
 def tool_pose(turns: Array, s: float, params: SnakeParams) -> Array:
     """X_WT (4, 4) of balls that turn by R_i (6, 3, 3) at a translation s."""
     X = np.eye(4)
@@ -138,6 +160,28 @@ def turns_of_angles(angles: ArrayLike) -> Array:
     for one, turns in zip(rows, out.reshape(-1, BALLS, 3, 3), strict=True):
         turned_to(one, turns)
     return out
+
+
+def ball_posture(x: ArrayLike) -> Array:
+    """s, then joints Rx, Ry, Rz a ball (19,), of a posture (7,)."""
+    return np.append(np.asarray(x, float)[0], angles_of(turns_of(x)))
+
+
+@compiled
+def ball_chain(
+    q: Any, h: float, tool: float, o: Any, e: Any, f: Any, n: Any, out: Any
+) -> None:
+    """As `kinematics.chain`, of free balls: s, then joints Rx, Ry, Rz a ball (19,)."""
+    p = along(o, q[0], n)
+    for i in range(BALLS):
+        put(p, out[i])
+        a, b, c = q[1 + 3 * i], q[2 + 3 * i], q[3 + 3 * i]
+        f, n = turned(f, n, math.cos(a), math.sin(a))
+        e, n = turned(e, n, math.cos(b), -math.sin(b))
+        e, f = turned(e, f, math.cos(c), math.sin(c))
+        p = along(p, 2 * h, n)
+    put(p, out[6])
+    put(along(p, tool, n), out[7])
 
 
 def corners_of(turns: Array, s: ArrayLike, params: SnakeParams) -> Array:

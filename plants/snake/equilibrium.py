@@ -29,12 +29,16 @@ MOST = 60
 """Iterations."""
 AT_ONCE = 1
 """Iterations in which what friction can hold stays as it is."""
+PATIENT = 5
+"""The same where that does not converge."""
 NEAR = 1e-9
 """As `TOLERANCE`, of a step with friction: what `BOUNDED` leaves is 30 times that."""
 QUICK = 8
 """Iterations in which a step is tried to be found at once (`sliding`)."""
 BOUNDED = 1e-5
 """Change of what friction can hold at which a step is done, in N."""
+STEPS = 16
+"""In which a period is gone through again to see whether the snake buckles."""
 
 
 @compiled
@@ -202,19 +206,23 @@ def slid(
             grip.most[:], grip.socket[:] = tried.most, tried.socket
             heat = remembered(now, to, s, grip)
             return now, to, to.H, total, done, False, heat
-    now, total, lost = start, 0, False
-    at_once = AT_ONCE if rough else most
-    for _ in range(most + 1):
-        now, to, count, done, left = settled(
-            now, pull, stiffness, wound, load, s, grip, min(at_once, most - total)
-        )
-        total, lost = total + count, lost or left
-        stuck = count == 0 and not done
-        if (bound(now, to, s, grip) < BOUNDED and done) or stuck or total >= most:
+    spent, lost, done = 0, False, False
+    for at_once in (AT_ONCE, PATIENT) if rough else (most, 0):
+        if done or at_once == 0:
             break
+        now, total = start, 0
+        for _ in range(most + 1):
+            now, to, count, done, left = settled(
+                now, pull, stiffness, wound, load, s, grip, min(at_once, most - total)
+            )
+            total, lost = total + count, lost or left
+            stuck = count == 0 and not done
+            if (bound(now, to, s, grip) < BOUNDED and done) or stuck or total >= most:
+                break
+        spent += total
     heat = remembered(now, to, s, grip)
     _reduced(to, s, g, H)
-    return now, to, H, total, done, lost, heat
+    return now, to, H, spent, done, lost, heat
 
 
 @compiled
@@ -239,12 +247,13 @@ def followed(
 
 @compiled
 def held(
-    values: Any, stiffness: float, wound: Any, load: Any, s: Any
-) -> tuple[Any, Any, Any, float, Any, bool]:
+    values: Any, start: Any, stiffness: float, wound: Any, load: Any, s: Any
+) -> tuple[Any, Any, Any, float, Any, bool, bool]:
     """A step of a snake that a flat grip holds, to what wires and load will be.
 
     Args:
         values: What friction holds on to, (204,).
+        start: R_i from which it is looked for, (6, 3, 3).
         stiffness: Of a wire in N/m.
         wound: L_d in m, (9,).
         load: Force and moment on the tool in W, (6,).
@@ -252,19 +261,49 @@ def held(
 
     Returns:
         R_i (6, 3, 3), tensions (9,), P (6, 9), the least eigenvalue of a further
-        step's Hessian, the flat grip after it, and whether the posture is lost: out of
-        balance, unstable or buckled. What ends in no number leaves the snake where it
-        was.
+        step's Hessian, the flat grip after it, whether the search led over states in
+        which it could not stay, and whether the posture is lost: out of balance or
+        unstable. What ends in no number leaves the snake where it was.
     """
     grip, none = grip_of(values), np.zeros(ROPES)
     before = grip.turns.copy()
-    now, to, H, _, done, left, _ = slid(
-        ahead(values), none, stiffness, wound, load, s, grip, MOST
+    now, to, H, _, done, astray, _ = slid(
+        start, none, stiffness, wound, load, s, grip, MOST
     )
     after, least = flat_grip(grip), math.nan
     if math.isfinite(np.abs(H).max()):
         least = np.linalg.eigvalsh(H)[0]
-    lost = left or not done or not least > 0.0
+    lost = not done or not least > 0.0
     if not math.isfinite(np.abs(after).max()):
-        return before, to.T, to.P, least, values.copy(), lost
-    return now, to.T, to.P, least, after, lost
+        return before, to.T, to.P, least, values.copy(), astray, lost
+    return now, to.T, to.P, least, after, astray, lost
+
+
+@compiled
+def leaps(values: Any, stiffness: float, before: Any, now: Any, s: Any) -> bool:
+    """Whether the snake buckles between two instants, seen in small steps.
+
+    The search for a distant equilibrium can lead over states in which the snake could
+    not stay, though on its own way there it does. It buckles if in a small step the
+    search does so, too, and the snake goes more than twice that step's share.
+
+    Args:
+        values: What friction holds on to at first, (204,).
+        stiffness: Of a wire in N/m.
+        before: Wound lengths and force on the tool then, (12,).
+        now: The same at the end.
+        s: The snake, as `Statics` packs it.
+    """
+    ways, astray = np.zeros(STEPS), np.zeros(STEPS)
+    for k in range(STEPS):
+        acting = before + (k + 1) / STEPS * (now - before)
+        load = np.append(acting[ROPES:], np.zeros(3))
+        start = grip_of(values).turns.copy()
+        turns, _, _, _, values, left, lost = held(
+            values, start, stiffness, acting[:ROPES], load, s
+        )
+        if lost:
+            return True
+        ways[k] = np.abs(turns - start).max()
+        astray[k] = 1.0 if left else 0.0
+    return bool((ways[astray > 0.5] > 2.0 * ways.mean()).any())

@@ -85,7 +85,7 @@ def chain(
         ca, sa = math.cos(x[1 + 2 * k]), math.sin(x[1 + 2 * k])
         cb, sb = math.cos(x[2 + 2 * k]), math.sin(x[2 + 2 * k])
         for half in range(2):
-            _put(p, out[2 * k + half])
+            put(p, out[2 * k + half])
             if half == 0:  # Rx(a) Ry(b)
                 f, n = turned(f, n, ca, sa)
                 e, n = turned(e, n, cb, -sb)
@@ -93,8 +93,8 @@ def chain(
                 e, n = turned(e, n, cb, -sb)
                 f, n = turned(f, n, ca, sa)
             p = along(p, 2 * h, n)
-    _put(p, out[6])
-    _put(along(p, tool, n), out[7])
+    put(p, out[6])
+    put(along(p, tool, n), out[7])
     return e, f, n
 
 
@@ -109,7 +109,8 @@ def link_axis(c: Any, i: int, h: float) -> Vector:
 
 
 @compiled
-def _put(p: Numbers, row: Any) -> None:
+def put(p: Numbers, row: Any) -> None:
+    """Writes a point into a row."""
     row[0], row[1], row[2] = p[0], p[1], p[2]
 
 

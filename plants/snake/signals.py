@@ -52,6 +52,15 @@ class Posture(NamedTuple):
     ]
 
 
+class BallPosture(NamedTuple):
+    """As `Posture`, of a snake of free balls."""
+
+    x: Annotated[
+        Numbers,
+        Field("m, rad", "s, then Rx, Ry, Rz a ball", (0.0,) * BALL_POSITIONS),
+    ]
+
+
 class Drums(NamedTuple):
     """Lengths of wires and the translation."""
 

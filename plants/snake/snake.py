@@ -28,7 +28,7 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from plants.snake.balls import angles_of, turns_of
+from plants.snake.balls import ball_posture
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.looks import draw_ball, draw_carriage, draw_plate, draw_tool
 from plants.snake.parameters import MODULES, STOP, SnakeParams
@@ -125,7 +125,7 @@ def set_default_posture(plant: Any, snake: Snake, x: Sequence[float]) -> None:
     """
     q = np.zeros(plant.num_positions(snake.instance))
     if len(q) == BALL_POSITIONS:
-        q[0], q[1:] = x[0], angles_of(turns_of(x))
+        q[:] = ball_posture(x)
     else:
         q[NEAR], q[FAR] = x, x[1:]
     plant.SetDefaultPositions(snake.instance, q)

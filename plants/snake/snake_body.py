@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plants.snake.balls import ball_chain
 from plants.snake.kinematics import POINTS, chain
 from plants.snake.parameters import SnakeParams
 from plants.tissue.space import (
@@ -135,6 +136,15 @@ def place(b: Body, x: Any, out: Any) -> None:
 
 
 @compiled
+def place_any(b: Body, x: Any, out: Any) -> None:
+    """As `place`, also of a `BallPosture` (19,)."""
+    if len(x) == 7:
+        place(b, x, out)
+    else:
+        ball_chain(x, b.h, b.tool, b.o, b.e, b.f, b.n, out)
+
+
+@compiled
 def from_entry(b: Body, p: Numbers) -> Vector:
     """A point of W in the entry's frame E."""
     return axis_from_entry(b, sub(p, b.o))
@@ -234,7 +244,7 @@ def check_limits(b: Body, x: Any) -> int:
 @compiled
 def between(x0: Any, x1: Any, share: float, out: Any) -> None:
     """The posture at a share of the straight way; at 1 exactly x1."""
-    for r in range(7):
+    for r in range(len(x0)):
         out[r] = x1[r] if share == 1.0 else x0[r] + share * (x1[r] - x0[r])
 
 

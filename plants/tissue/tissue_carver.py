@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
-from plants.snake.signals import REST, Posture
+from plants.snake.signals import REST, BallPosture, Posture
 from plants.snake.snake_body import (
     CULPRIT,
     OK,
@@ -18,7 +18,7 @@ from plants.snake.snake_body import (
     between,
     body_of,
     check_body,
-    place,
+    place_any,
 )
 from plants.tissue.execution import Execution
 from plants.tissue.labels import CHANNEL, TUMOUR
@@ -28,7 +28,7 @@ from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import along, norm, sub, xyz
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, flat
+from systems.common.signal import Field, flat, size
 
 
 @dataclass
@@ -110,8 +110,8 @@ def carve(
         b: The body, at its true size.
         labels: Of the voxels, flat.
         critical: Distance to what is critical in m, flat; empty if nothing is.
-        x0: Posture (7,) before.
-        x1: Posture (7,) now.
+        x0: Posture (7,) or `BallPosture` (19,) before.
+        x1: The same now.
         pitch: Longest way of the tool between stamps, in m.
         time: Arrival time of what is freed.
         cutting: Whether anything is.
@@ -121,17 +121,17 @@ def carve(
         least distance in m of tool or body to what is critical, and the tool's way
         in m.
     """
-    c, x, why = np.empty((POINTS, 3)), np.empty(7), np.empty(CULPRIT)
-    place(b, x0, c)
+    c, x, why = np.empty((POINTS, 3)), np.empty(len(x0)), np.empty(CULPRIT)
+    place_any(b, x0, c)
     p = xyz(c[7], 0)
-    place(b, x1, c)
+    place_any(b, x1, c)
     way = norm(sub(c[7], p))
     steps = max(1, math.ceil(way / pitch))
     tumour, healthy, hits = 0, 0, 0
     nearest = math.inf
     for n in range(1, steps + 1):
         between(x0, x1, n / steps, x)
-        place(b, x, c)
+        place_any(b, x, c)
         hits += check_body(s, b, c, 0, why) != OK
         first = s.used[0]
         if cutting:
@@ -268,7 +268,8 @@ class TissueCarver(Block):
     State is the index of the carved moves, the posture there, and the counts; the
     voxels are a memo of it (`Carving`).
 
-    Port ``posture`` accepts the snake's true `Posture`.
+    Port ``posture`` accepts the snake's true `Posture`, or its `BallPosture` if the
+    block began at one.
     Port ``entry`` accepts the number of the channel it works through; the first if
     nothing is connected.
     Port ``tool`` accepts the `ToolBall` it carries; its own if nothing is connected.
@@ -286,13 +287,21 @@ class TissueCarver(Block):
         carving: Carving | None = None,
         posture: Sequence[float] = REST,
     ) -> None:
-        """Makes the block for tissue, a small block of tumour if None."""
+        """Makes the block for tissue, a small block of tumour if None.
+
+        Args:
+            params: Of the carving.
+            snake: Geometry.
+            carving: The tissue.
+            posture: Where the snake is at first, (7,), or (19,) of free balls.
+        """
         super().__init__()
         self._params = check(params or TissueCarverParams())
         snake = check(snake or SnakeParams())
         self.carving = carving or Carving(_example_volume(), snake)
         self._voxel = self.carving.volume.voxel
-        self._posture = self.signal_in("posture", Posture)
+        kind = Posture if len(posture) == size(Posture) else BallPosture
+        self._posture = self.signal_in("posture", kind)
         self._entry = self.signal_in("entry", Entry)
         self._tool = self.signal_in("tool", ToolBall)
         self._cutting = self.signal_in("cutting", Cutting)

@@ -1,13 +1,18 @@
 """Ball location: tool pose, mean posture and gaps from the turns of six balls."""
 
-import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.balls import BALLS, gaps_of, tool_of, turned_to
+from plants.snake.balls import BALLS, gaps_of, mean_bends, tool_of, turned_to
 from plants.snake.parameters import MODULES, SnakeParams
-from plants.snake.signals import MODULE_NUMBERS, BallState, Numbers, ToolPose
+from plants.snake.signals import (
+    MODULE_NUMBERS,
+    BallPosture,
+    BallState,
+    Numbers,
+    ToolPose,
+)
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check
 from systems.common.signal import Field
@@ -53,28 +58,29 @@ class Gaps(NamedTuple):
 
 
 @compiled
-def _located(c: Any, state: BallState) -> tuple[Bends, ToolPose, BallAngles, Gaps]:
+def _located(
+    c: Any, state: BallState
+) -> tuple[BallPosture, Bends, ToolPose, BallAngles, Gaps]:
     """All of the outputs."""
     turns: Any = np.empty((BALLS, 3, 3))
-    angles: Any = np.array(state.q[1:])
+    posture: Any = np.array(state.q)
+    angles: Any = posture[1:].copy()
     turned_to(angles, turns)
     split: Any = np.empty(MODULES)
     torsion: Any = np.empty(BALLS)
     gaps_of(turns, split, torsion)
-    bends: Any = np.empty(1 + 2 * MODULES)
-    bends[0] = state.q[0]
-    for k in range(MODULES):
-        axis = turns[2 * k, :, 2] + turns[2 * k + 1, :, 2]
-        bends[1 + 2 * k] = math.atan2(axis[1], axis[0])
-        bends[2 + 2 * k] = math.atan2(math.hypot(axis[0], axis[1]), axis[2])
+    bends: Any = np.append(posture[:1], mean_bends(turns))
     p, n = tool_of(turns, state.q[0], c.half_pitch, c.tool_offset)
-    return Bends(bends), ToolPose(p, n), BallAngles(angles), Gaps(split, torsion)
+    pose = ToolPose(p, n)
+    gaps = Gaps(split, torsion)
+    return BallPosture(posture), Bends(bends), pose, BallAngles(angles), gaps
 
 
 class BallLocation(StepBlock):
     """Where a snake of free balls truly is.
 
     Port ``state`` accepts the plant's `BallState`.
+    Port ``posture`` emits the `BallPosture`.
     Port ``bends`` emits the mean bend of each module's balls, `Bends`.
     Port ``tool`` emits the `ToolPose`.
     Port ``balls`` emits their `BallAngles`.
@@ -87,6 +93,7 @@ class BallLocation(StepBlock):
         snake = check(snake or SnakeParams())
         constants = packed(half_pitch=snake.half_pitch, tool_offset=snake.tool_offset)
         outputs = {
+            "posture": BallPosture,
             "bends": Bends,
             "tool": ToolPose,
             "balls": BallAngles,

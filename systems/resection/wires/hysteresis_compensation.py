@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from plants.snake.balls import tool_of, tool_pose, turns_of
+from plants.snake.balls import mean_posture, tool_of, tool_pose, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.equilibrium import ahead, followed
@@ -26,6 +26,7 @@ from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter, part
 from systems.common.signal import example
 from systems.common.step_block import StepBlock
+from systems.resection.wires.tool_load import resisting
 from systems.resection.wires.tool_tracker import TrackedTool
 from systems.resection.wires.wire_inverse_actuation import (
     WireInverseActuationParams,
@@ -43,9 +44,6 @@ TINY = 1e-7
 """Of a posture, by which the tool's pose is differentiated."""
 MOST = np.array([0.01, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35])
 """By which a posture is moved at most."""
-SLOW = 1e-3
-"""Speed in m/s below which the model takes cutting to resist the
-less, the slower the tool is to be."""
 FRAMES = 16
 """Instants whose prediction is kept for frames that come late."""
 
@@ -58,6 +56,9 @@ class HysteresisCompensationParams:
     friction: SnakeFrictionParams = part(SnakeFrictionParams)
     cutting: float = parameter(
         0.0, "force that it takes to oppose the motion", "N", least=0.0, most=3.0
+    )
+    tissue: float = parameter(
+        60.0, "stiffness that it takes what is cut to have", "N/m", above=0, most=1e5
     )
     dither: float = parameter(
         0.0,
@@ -80,10 +81,20 @@ def _pose(x: np.ndarray, h: float, tool: float) -> np.ndarray:
 
 
 @compiled
-def aimed(x: np.ndarray, off: np.ndarray, h: float, tool: float) -> np.ndarray:
-    """By how much to move a posture (7) so that the tool's pose moves by `off` (6).
+def aimed(
+    x: np.ndarray, off: np.ndarray, astray: np.ndarray, h: float, tool: float
+) -> np.ndarray:
+    """By how much to move a posture so that its tool's pose moves by `off`.
 
-    h is half the pitch, tool the tool's offset, in m.
+    The two freedoms that are left move the posture by `astray`: nothing else leads the
+    body, and steps of the tool alone would add up in them.
+
+    Args:
+        x: The posture, (7,).
+        off: Of the tool, place and axis, (6,).
+        astray: Of the posture, (7,).
+        h: Half the pitch, m.
+        tool: The tool's offset, m.
     """
     A, here, y = np.empty((6, 7)), _pose(x, h, tool), x.copy()
     for i in range(7):
@@ -93,21 +104,17 @@ def aimed(x: np.ndarray, off: np.ndarray, h: float, tool: float) -> np.ndarray:
         y[i] = x[i]
     goal = off.copy()
     goal[3:] *= LEVER
-    return SCALE * (A.T @ np.linalg.solve(A @ A.T + DAMPING**2 * np.eye(6), goal))
+    rest = astray / SCALE
+    damped = A @ A.T + DAMPING**2 * np.eye(6)
+    return SCALE * (rest + A.T @ np.linalg.solve(damped, goal - A @ rest))
 
 
-@compiled
-def opposing(force: float, moved: np.ndarray, time: float) -> np.ndarray:
-    """The model's force in N against a way (3,) in m that took some time in s."""
-    speed = np.sqrt((moved * moved).sum()) / time
-    return -force / max(speed, SLOW) * moved / time
-
-
-PARTS = np.cumsum(np.array([GRIP, 7, 7, 6]))
+PARTS = np.cumsum(np.array([GRIP, 7, 7, 3, 6]))
 """Where in the state the parts after the first begin: what the model's friction holds
 on to, flat (204,); the last posture asked for (7,); what it is wound for besides (7,);
-by which the tool is off the model, place and axis (6,); and the model's tool, of this
-instant and those before (FRAMES, 6)."""
+the force that the model takes the tool to feel (3,); by which the tool is off the
+model, place and axis (6,); and the model's tool, of this instant and those before
+(FRAMES, 6)."""
 
 
 @compiled
@@ -135,14 +142,14 @@ def _step(
     frame: TrackedTool,
 ) -> tuple[np.ndarray, Drums]:
     """The next state, and the drums."""
-    i, j, k, n = PARTS
+    i, j, k, m, n = PARTS
     grip, before, shift, said = last[:i], last[i:j], last[j:k], last[n:]
-    bias, x = _biased(c, last[k:n], said, time, frame), np.array(posture.x)
+    bias, x = _biased(c, last[m:n], said, time, frame), np.array(posture.x)
     x = x if np.isfinite(x).all() else before
     h, tool = c.half_pitch, c.tool_offset
     wanted = _pose(x, h, tool)
     moved = wanted[:3] - _pose(before, h, tool)[:3]
-    force = opposing(c.cutting, moved, c.period)
+    force = resisting(last[k:m], moved, c.tissue, c.cutting)
     load = np.append(force, np.zeros(3))
     shaken = c.dither * (1.0 if round(time / c.period) % 2 == 0 else -1.0)
     start = ahead(grip)
@@ -156,9 +163,10 @@ def _step(
         )
         p, axis = tool_of(start, x[0] + shift[0], h, tool)
         tip = np.array((*p, *axis))
-        step = aimed(x + shift, wanted - bias - tip, h, tool)
+        astray = x - mean_posture(start, x[0] + shift[0])
+        step = aimed(x + shift, wanted - bias - tip, astray, h, tool)
         shift = np.minimum(np.maximum(shift + step, -MOST), MOST)
-    state = np.concatenate((after, x, shift, bias, tip, said[:-6]))
+    state = np.concatenate((after, x, shift, force, bias, tip, said[:-6]))
     if not np.isfinite(state).all():
         state = last.copy()
         drums = stretched(wound, before + last[j:k], np.zeros(3))
@@ -206,7 +214,7 @@ class HysteresisCompensation(StepBlock):
             _step,
             [constants, winder(check(stiff), snake, drive, core), model.record],
             {"posture": Posture, "measured": TrackedTool},
-            np.concatenate([flat_grip(grip), x, np.zeros(7 + 6), said]),
+            np.concatenate([flat_grip(grip), x, np.zeros(7 + 3 + 6), said]),
             {"drums": Drums},
             params.period,
             defaults={"measured": example(TrackedTool)},

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from plants.snake.balls import angles_of, turns_of
 from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
-from plants.snake.equilibrium import held
-from plants.snake.friction import SnakeFrictionParams, flat_grip
+from plants.snake.equilibrium import ahead, held, leaps
+from plants.snake.friction import GRIP, SnakeFrictionParams, flat_grip
 from plants.snake.parameters import WIRES, SnakeParams
 from plants.snake.signals import (
     REST,
@@ -22,6 +22,7 @@ from plants.snake.signals import (
 )
 from plants.snake.snake import BALL_POSITIONS
 from plants.snake.statics import Statics
+from plants.snake.statics_kernels import ROPES
 from systems.common.compiled import compiled, packed
 from systems.common.signal import Field
 from systems.common.step_block import StepBlock
@@ -44,13 +45,19 @@ def _step(
     wound = np.array(drums.wires) + c.lead * np.array(rates.wires)
     if not np.isfinite(wound).all():  # infinitely long is not slack
         wound[:] = np.nan
-    load = np.array((on.f[0], on.f[1], on.f[2], 0.0, 0.0, 0.0))
-    turns, T, P, least, after, lost = held(last[:-1], c.stiffness, wound, load, snake)
+    acting = np.append(wound, np.array(on.f))
+    load = np.append(acting[ROPES:], np.zeros(3))
+    grip = last[:GRIP]
+    turns, T, P, least, after, astray, lost = held(
+        grip, ahead(grip), c.stiffness, wound, load, snake
+    )
+    if astray and not lost:
+        lost = leaps(grip, c.stiffness, last[GRIP + 1 :], acting, snake)
     s = drums.s + c.travel_lead * rates.s
-    s = s if np.isfinite(s) else last[-1]
+    s = s if np.isfinite(s) else last[GRIP]
     x: Any = np.append(np.array([s]), angles_of(turns))
     still: Any = np.zeros(len(x))
-    state = np.append(after, np.array([s]))
+    state = np.concatenate((after, np.array([s]), acting))
     stability = Stability(least, 1.0 if lost else 0.0)
     tension: Any = T
     tip: Any = T.copy()
@@ -104,13 +111,15 @@ class WireStatics(StepBlock):
             travel_lead=lag.travel_lead + period,
             stiffness=lag.wire_stiffness,
         )
-        # What friction holds on to, R_i among it, and s at the last update.
+        # What friction holds on to, R_i among it, and at the last update s, then
+        # lengths and force, which are not known at first.
         start = flat_grip(statics.at_rest(turns_of(posture)))
+        unknown = np.full(ROPES + 3, np.nan)
         self.declare_step(
             _step,
             [constants, statics.record],
             {"lengths": Drums, "rates": DrumRates, "force": ToolForce},
-            np.append(start, np.asarray(posture, float)[0]),
+            np.concatenate([start, np.asarray(posture, float)[:1], unknown]),
             {
                 "desired_state": BallSetPoint,
                 "tension": Tensions,

@@ -18,7 +18,11 @@ from systems.resection.wires.hysteresis_compensation import (
     HysteresisCompensationParams,
     aimed,
 )
-from systems.resection.wires.tool_load import ToolLoad, ToolLoadParams
+from systems.resection.wires.tool_load import (
+    ToolLoad,
+    ToolLoadParams,
+    resisting,
+)
 from systems.resection.wires.tool_tracker import ToolTracker, ToolTrackerParams
 from systems.resection.wires.wire_inverse_actuation import WireInverseActuationParams
 
@@ -42,21 +46,24 @@ def tick(dut, context):
     context.SetTime(context.get_time() + 0.02)
 
 
-def errors(own, tracked=False):
-    """Of the tool in m, wound for by a model of its own friction."""
-    params = HysteresisCompensationParams(friction=own)
+def errors(own, tracked=False, load=0.0, cutting=0.0):
+    """Of the tool in m, wound for by a model of its own friction and tissue."""
+    params = HysteresisCompensationParams(friction=own, cutting=cutting)
     dut = HysteresisCompensation(params, WOUND, PARAMS, DRIVE, CORE)
     context = dut.CreateDefaultContext()
     snake = Statics(PARAMS, DRIVE, CORE, friction=ROUGH)
     turns, grip, off, seen = turns_of(np.zeros(7)), None, [], None
+    force, place = np.zeros(3), forward(np.zeros(7), PARAMS)[:3, 3]
     for x in swing():
         dut.GetInputPort("posture").FixValue(context, x)
         if tracked and seen is not None:
             dut.GetInputPort("measured").FixValue(context, seen)
         drums = dut.GetOutputPort("drums").Eval(context)
-        found = snake.equilibrium(turns, wound=drums[:9], grip=grip)
+        found = snake.equilibrium(turns, wound=drums[:9], force=force, grip=grip)
         turns, grip = found.turns, found.grip
         X_WT = tool_pose(turns, drums[9], PARAMS)
+        force = resisting(force, X_WT[:3, 3] - place, 60.0, load)
+        place = X_WT[:3, 3]
         tick(dut, context)
         seen = [*X_WT[:3, 3], *X_WT[:3, 2], context.get_time()]
         off.append(np.linalg.norm(X_WT[:3, 3] - forward(x, PARAMS)[:3, 3]))
@@ -73,12 +80,30 @@ def test_a_right_model_takes_the_error_away_and_tracking_helps_a_wrong_one():
     assert tracked[-1] < 0.3 * none[-1]
 
 
+def test_a_model_that_draws_tissue_along_knows_the_force_when_the_tool_turns_back():
+    none, known = (errors(ROUGH, load=0.3, cutting=own) for own in (0.0, 0.3))
+    assert known.max() < 0.3 * none.max()
+    assert known[-1] < 0.3 * none[-1]  # it stands, and tissue still pulls
+
+
 def test_a_posture_is_moved_as_far_as_the_tool_is_off():
     x = posture_of([0.01, 0.4, 0.3, -1.2, 0.3, 2.5, 0.3])
     off = np.array([1e-4, -5e-5, 8e-5, 0.0, 0.0, 0.0])
-    step = aimed(x, off, PARAMS.half_pitch, PARAMS.tool_offset)
+    h, tool = PARAMS.half_pitch, PARAMS.tool_offset
+    step = aimed(x, off, 0 * x, h, tool)
     moved = forward(x + step, PARAMS) - forward(x, PARAMS)
     np.testing.assert_allclose(moved[:3, 3], off[:3], atol=3e-6)
+    # What moves no tool leads the body back.
+    astray = 0.01 * redundant(x)
+    led = aimed(x, 0 * off, astray, h, tool)
+    np.testing.assert_allclose(led, astray, atol=2e-4)
+
+
+def redundant(x):
+    """A unit vector along which a posture leaves the tool's pose as it is."""
+    pose = [np.ravel(forward(x + d, PARAMS)[:3, 2:]) for d in 1e-6 * np.eye(7)]
+    J = (np.array(pose) - np.ravel(forward(x, PARAMS)[:3, 2:])) / 1e-6
+    return np.linalg.svd(J.T)[2][-1]
 
 
 @pytest.mark.parametrize("port", ["posture", "measured"])

@@ -4,11 +4,22 @@ import numpy as np
 import pytest
 
 from plants.snake.actuation import wire_lengths
-from plants.snake.balls import angles_of, turns_of
-from plants.snake.kinematics import forward
+from plants.snake.balls import (
+    angles_of,
+    ball_posture,
+    corners_of,
+    turns_of,
+    turns_of_angles,
+)
+from plants.snake.core import SnakeCoreParams
+from plants.snake.equilibrium import leaps
+from plants.snake.friction import flat_grip
+from plants.snake.kinematics import centreline, forward
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import posture_of
 from plants.snake.signals import BallState
+from plants.snake.snake_body import body_of, place_any
+from plants.snake.statics import Statics
 from systems.common.parameter import ParameterError
 from systems.resection.wires.ball_location import BallLocation
 from systems.resection.wires.tool_load import ToolLoad, ToolLoadParams
@@ -76,3 +87,31 @@ def test_load_grows_steadily():
         np.testing.assert_allclose(f, share * np.array([0.2, 0.0, -0.1]))
     with pytest.raises(ParameterError, match=r"end=1\.0 s: expected > start"):
         ToolLoad(ToolLoadParams(start=2.0, end=1.0))
+
+
+@pytest.mark.parametrize("more", [1e-4, 3e-4, 8e-4])
+def test_buckling_is_told_from_a_long_way(more):
+    """Winding on bends the snake; more pretension buckles it, on a soft core."""
+    snake = Statics(core=SnakeCoreParams(bend=0.02, twist=0.0155))
+    here, there = (wire_lengths(x, PARAMS) - 5e-5 for x in (0.2 * X, 0.5 * X))
+    no = np.zeros(3)
+    grip = flat_grip(snake.equilibrium(turns_of(0.2 * X), wound=here).grip)
+    bent, pulled = (np.append(way, no) for way in (there, here - more))
+
+    def leap(now):
+        k = snake.drive.wire_stiffness
+        return leaps(grip, k, np.append(here, no), now, snake.record[0])
+
+    assert not leap(bent)
+    assert leap(pulled)
+
+
+def test_true_balls_are_where_the_paper_has_them():
+    """The body's corners of balls that turn alike, and of some that do not."""
+    body, out = body_of(PARAMS), np.empty((8, 3))
+    place_any(body, ball_posture(X), out)
+    np.testing.assert_allclose(out, centreline(X, PARAMS), atol=1e-12)
+    q = ball_posture(X) + 0.1 * np.sin(np.arange(19))
+    place_any(body, q, out)
+    expected = corners_of(turns_of_angles(q[1:]), q[0], PARAMS)
+    np.testing.assert_allclose(out, expected, atol=1e-12)
