@@ -9,6 +9,7 @@ from plants.snake.signals import ToolForce, ToolPose
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import view
 
 
 @dataclass
@@ -60,14 +61,11 @@ def resisting(
 
 
 @compiled
-def cut(
-    last: np.ndarray, tool: np.ndarray, stiffness: float, most: float
-) -> np.ndarray:
-    """Where the tool is, and what resists it, (6,), from a `ToolPose`'s elements.
+def cut(last: np.ndarray, p: np.ndarray, stiffness: float, most: float) -> np.ndarray:
+    """Where the tool is, and what resists it, (6,), from its place p_WT (3,).
 
     A place that is no number leaves the last; before the first there is no motion.
     """
-    p = tool[:3]
     if not np.isfinite(p).all():
         return last.copy()
     moved = p - last[:3] if np.isfinite(last).all() else np.zeros(3)
@@ -98,8 +96,8 @@ class ToolLoad(Block):
         last = context.get_discrete_state(0).value()
         if not self._tool.HasValue(context):
             return np.array(last)
-        c, tool = self._params, self._tool.Eval(context)
-        return cut(last, tool, c.tissue, c.cutting)
+        c, tool = self._params, view(ToolPose, self._tool.Eval(context))
+        return cut(last, np.array(tool.p), c.tissue, c.cutting)
 
     def _calc_force(self, context: Any) -> np.ndarray:
         p = self._params
