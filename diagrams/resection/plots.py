@@ -220,12 +220,6 @@ def _stayed(case: Any) -> str:
         share = 100 * lump.volume / volume.tumour_volume
         shown = f"{share:.1f} %" if share >= 0.1 else "< 0.1 %"
         rows.append(f"{1e9 * lump.volume:.0f} mm³ ({shown}): {lump.reason}")
-    # A part that lies round what is removed is not among them (`operation._gone`).
-    named = sum(lump.volume for lump in case.reach.lumps)
-    rest = (1.0 - case.reach.fraction) * volume.tumour_volume - named
-    if rest > 1e-3 * volume.tumour_volume:
-        share = 100 * rest / volume.tumour_volume
-        rows.append(f"{1e9 * rest:.0f} mm³ ({share:.1f} %): in other parts")
     if len(rows) == 1:
         rows.append("nothing")
     return "\n".join(rows)

@@ -120,6 +120,7 @@ def error_figure(curves: dict[str, list[Strayed]]) -> Any:
             errors = [1e3 * row.error for row in rows]
             shares = [100 * getattr(row, name) for row in rows]
             axes.plot(errors, shares, "o-", color=color, label=label)
-        axes.set_ylim(0, None)
-    axes.legend()
+        axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
+        if place == 1:  # where it hides no curve
+            axes.legend(loc="lower right")
     return figure

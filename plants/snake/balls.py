@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from plants.snake.kinematics import put, turned
 from plants.snake.parameters import MODULES, SnakeParams
-from plants.snake.posture import Array, bends_of, module_angles, whole_postures
+from plants.snake.posture import Array, module_angles, whole_postures
 from systems.common.compiled import compiled
 from systems.common.geometry import Vector, along, norm
 
@@ -45,15 +45,29 @@ def turned_by(turns: Any, delta: Any, out: Any) -> None:
         times(turns[i], E, out[i])
 
 
+@compiled
+def bent_turns(x: Any, turns: Any) -> None:
+    """R_i (6, 3, 3) of a posture (7,), alike in a module and without torsion."""
+    delta = np.zeros(TURNS)
+    for k in range(MODULES):
+        a, b = x[1 + 2 * k], x[2 + 2 * k]
+        across, along = math.sin(b), -math.sin(a) * math.cos(b)
+        sine = math.hypot(across, along)
+        size = math.atan2(sine, math.cos(a) * math.cos(b))
+        for i in (6 * k, 6 * k + 3):
+            delta[i] = -size * along / (sine if sine > 0.0 else 1.0)
+            delta[i + 1] = size * across / (sine if sine > 0.0 else 1.0)
+    straight = np.zeros((BALLS, 3, 3))
+    for i in range(3):
+        straight[:, i, i] = 1.0
+    turned_by(straight, delta, turns)
+
+
 def turns_of(x: ArrayLike) -> Array:
-    """R_i (6, 3, 3) of a posture (7,): alike in a module, and without torsion."""
-    q = bends_of(whole_postures(x))
-    turns = np.broadcast_to(np.eye(3), (BALLS, 3, 3)).copy()
-    alpha, beta = q[1::2], q[2::2]
-    axes = np.stack([-beta * np.sin(alpha), beta * np.cos(alpha), 0 * beta], axis=1)
-    out = np.empty_like(turns)
-    turned_by(turns, np.repeat(axes, 2, axis=0).ravel(), out)
-    return out
+    """R_i (6, 3, 3) of a posture (7,), see `bent_turns`."""
+    turns = np.empty((BALLS, 3, 3))
+    bent_turns(whole_postures(x), turns)
+    return turns
 
 
 @compiled

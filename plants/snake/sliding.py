@@ -22,9 +22,7 @@ from plants.snake.friction import turning
 from plants.snake.parameters import WIRES
 from plants.snake.statics_kernels import ROPES, Forces, Grip, assembled, sliding_axis
 from systems.common.compiled import compiled
-
-CLOSER = 1.0
-"""Share of its torques that an iteration leaves at most, or it is given up."""
+from systems.common.elimination import solve_positive
 
 
 @compiled
@@ -62,24 +60,6 @@ def _followed(
             K[a, b] = to.H[a, b]
             for w in range(WIRES * (b // (3 * 2)), ROPES):
                 K[a, b] += U[a, w] * to.J[w, b]
-
-
-@compiled
-def _solved(K: Any, g: Any, step: Any) -> None:
-    """Step = -K^-1 g, by elimination; K is destroyed, and is as good as positive."""
-    n = len(g)
-    for i in range(n):
-        step[i] = -g[i]
-    for j in range(n):
-        for i in range(j + 1, n):
-            share = K[i, j] / K[j, j]
-            for b in range(j + 1, n):
-                K[i, b] -= share * K[j, b]
-            step[i] -= share * step[j]
-    for j in range(n - 1, -1, -1):
-        for b in range(j + 1, n):
-            step[j] -= K[j, b] * step[b]
-        step[j] /= K[j, j]
 
 
 @compiled
@@ -121,10 +101,11 @@ def quickly(
         left = np.abs(to.g).max()
         if left < tolerance:
             return now, count, True
-        if not left < CLOSER * before:
+        if not left < before:
             break
         before = left
-        _solved(K, to.g, step)
+        step[:] = -to.g
+        solve_positive(K, step)  # as good as positive
         turned_by(now, step, new)
         now, new = new, now
     return start, most, False

@@ -66,10 +66,10 @@ def withdrawal(
     for i in range(len(obstacles)):
         oldest = max(oldest, read_estimate(obstacles[i]).age)
     shaft, withdraws = sub(p, g), False
-    u, q = unit(shaft), norm(shaft)
-    way = q - workspace.min_insertion - _MORE
+    way = norm(shaft) - workspace.min_insertion - _MORE
     if oldest <= _OVERDUE or way <= 0.0:
         return 0.0
+    u, q = unit(shaft), norm(shaft)
     for i in range(len(tools)):
         tool = read_tool(tools[i])
         rate = distance_rate(g, p, tool)

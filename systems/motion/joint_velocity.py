@@ -10,6 +10,7 @@ import numpy as np
 import quadprog
 
 from systems.common.compiled import compiled
+from systems.common.elimination import solve_positive
 
 _BOUNDS = np.hstack([np.eye(7), -np.eye(7)])
 _LITTLE = 1e-6
@@ -24,23 +25,6 @@ def product(A: np.ndarray, x: np.ndarray) -> np.ndarray:
         for j in range(A.shape[1]):
             result[i] += A[i, j] * x[j]
     return result
-
-
-@compiled
-def solve_positive(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Solves A x = b for a symmetric positive A by elimination; changes both."""
-    n = len(b)
-    for k in range(n):
-        for i in range(k + 1, n):
-            factor = A[i, k] / A[k, k]
-            for j in range(k, n):
-                A[i, j] -= factor * A[k, j]
-            b[i] -= factor * b[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            b[k] -= A[k, j] * b[j]
-        b[k] /= A[k, k]
-    return b
 
 
 @compiled

@@ -274,15 +274,17 @@ def why_stop(
 
 
 @compiled
-def evades(reason: Stop, code: float) -> bool:
+def evades(reason: Stop, permission: Permission) -> bool:
     """Whether a tool that must stand still gets out of another one's way.
 
     Not if it never saw the tools or does not know where it is itself, and not while
     the arm gives way to a loaded wall.
     """
-    if reason == Stop.MOVING:
-        return code == float(Stop.PROBING.value)
+    stands = permission.speed_scale <= 0.0
+    if stands and permission.code != float(Stop.PROBING.value):
+        return False
     return reason in (
+        Stop.MOVING,
         Stop.TARGET_LOST,
         Stop.OBSTACLE_LOST,
         Stop.OUT_OF_REACH,
@@ -316,7 +318,7 @@ def _update(
     code, moves = float(reason.value), reason == Stop.MOVING
     if moves and permission.speed_scale <= 0.0:
         code, moves = permission.code, False
-    if escapes and not moves and evades(reason, code):
+    if escapes and not moves and evades(reason, permission):
         # It stands where it was told to go, not where a tool comes.
         moves = True
         p = plus(robot.tip, limited(sub(p, robot.tip), params.follow_error))

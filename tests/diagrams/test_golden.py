@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.golden import differences, figures, golden
+from tests.golden import differences, figures, golden, strayed
 
 GOLDEN = golden()
 LONG = {
@@ -19,13 +19,14 @@ def marks(row):
 
 @pytest.mark.parametrize("row", [pytest.param(r, marks=marks(r)) for r in GOLDEN])
 def test_figures_are_golden(row):
-    assert differences(GOLDEN[row], figures(row), row) == []
+    assert strayed(row, GOLDEN[row], figures(row)) == []
 
 
 def test_a_difference_is_told():
     old = {"a": 1.0, "b": [1, {"c": None}], "gone": 0.0}
     same = {"a": 1.0 + 1e-10, "b": [1, {"c": None}], "gone": 0.0}
     assert differences(old, same) == []
+    assert differences(old, {**old, "a": 1.04}, part=0.05) == []
     new = {"a": 1.0 + 1e-8, "b": [1, {"c": 0.0}], "late": 0.0}
     assert differences(old, new, "x") == [
         "x.a: 1.0 -> 1.00000001",

@@ -54,7 +54,7 @@ class Lump:
 
     Attributes:
         volume: In m3.
-        where: Its centroid in W, in m.
+        where: Its place nearest to its centroid, p_W in m.
         reason: Why it is not reached.
     """
 
@@ -220,11 +220,18 @@ def _lumps(
     return [
         Lump(
             len(points) * volume.voxel,
-            points.mean(axis=0).tolist(),
+            _middle(points).tolist(),
             _reason(session, volume, points, mask, box, opening, draws),
         )
         for points, mask, box in places
     ]
+
+
+def _middle(points: NDArray) -> NDArray:
+    """A part's point that is nearest to its mean, where a shell has none."""
+    off = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    middle: NDArray = points[int(np.argmin(off))]
+    return middle
 
 
 def _reason(

@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.balls import BALLS, tool_of, turned_to
+from plants.snake.balls import BALLS, times, turned_to
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import BallState, ToolForce
@@ -49,22 +49,23 @@ class BaseSensorParams:
 
 
 @compiled
-def weighed(c: Any, q: np.ndarray) -> tuple[Vector, Vector, Vector]:
-    """Weight and its moment about W's origin, and p_WT, of positions q (19,).
+def weighed(c: Any, s: float, turns: Any) -> tuple[Vector, Vector, Vector]:
+    """Weight and its moment about W's origin, and p_WT, of balls that turn by R_i.
 
     The carriage's mass hangs on the channel's axis, where it has no arm.
     """
-    turns, A = np.empty((BALLS, 3, 3)), np.eye(3)
-    turned_to(q[1:], turns)
-    p = (0.0, 0.0, q[0])
+    A, B = np.eye(3), np.empty((3, 3))
+    n = (0.0, 0.0, 1.0)
+    p = (0.0, 0.0, s)
     moment = (0.0, 0.0, 0.0)  # of mass times place
     for i in range(BALLS):
-        A = A @ turns[i]
+        times(A, turns[i], B)
+        A, B = B, A
         moment = along(moment, c.ball_mass, p)
         n = (A[0, 2], A[1, 2], A[2, 2])
         moment = along(moment, c.plate_mass, along(p, c.half_pitch, n))
         p = along(p, 2 * c.half_pitch, n)
-    tip, _ = tool_of(turns, q[0], c.half_pitch, c.tool_offset)
+    tip = along(p, c.tool_offset, n)
     moment = along(moment, c.tool_mass, tip)
     g = (c.gravity[0], c.gravity[1], c.gravity[2])
     return scaled(c.mass, g), cross(moment, g), tip
@@ -86,7 +87,9 @@ def scale(snake: SnakeParams, drive: SnakeDriveParams, **more: Any) -> np.ndarra
 def _read(
     c: Any, state: BallState, force: ToolForce, noise: SensorNoise
 ) -> tuple[BaseWrench]:
-    f, m, tip = weighed(c, np.array(state.q))
+    turns, q = np.empty((BALLS, 3, 3)), np.array(state.q)
+    turned_to(q[1:], turns)
+    f, m, tip = weighed(c, q[0], turns)
     f = along(plus(f, force.f), c.force_noise, noise.f)
     m = along(plus(m, cross(tip, force.f)), c.moment_noise, noise.m)
     return (BaseWrench(f, m),)

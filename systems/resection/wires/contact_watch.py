@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.balls import angles_of
+from plants.snake.balls import BALLS, bent_turns
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.parameters import SnakeParams
 from plants.snake.signals import Posture
@@ -21,7 +21,6 @@ from systems.common.parameter import check, parameter
 from systems.common.signal import AXES, Field
 from systems.common.step_block import StepBlock
 from systems.resection.wires.base_sensor import BaseWrench, scale, weighed
-from systems.resection.wires.tension_estimator import bent_turns
 
 MOST = 50
 """Samples of a window at most."""
@@ -56,9 +55,9 @@ def _step(
     """Count, the zero (6), the window (MOST, 6); and what it tells."""
     state, x = last.copy(), np.array(posture.x)
     left = np.array((*wrench.f, *wrench.m))
-    turns = np.empty((6, 3, 3))
+    turns = np.empty((BALLS, 3, 3))
     bent_turns(x, turns)
-    f, m, _ = weighed(model, np.append(x[:1], angles_of(turns)))
+    f, m, _ = weighed(model, x[0], turns)
     left -= np.array((*f, *m))
     zero, window = state[1:7], state[7:].reshape((MOST, 6))
     n = int(c.samples)

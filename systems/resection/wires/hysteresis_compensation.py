@@ -18,11 +18,13 @@ from plants.snake.core import SnakeCoreParams
 from plants.snake.drive import SnakeDriveParams
 from plants.snake.equilibrium import ahead, followed
 from plants.snake.friction import GRIP, SnakeFrictionParams, flat_grip
+from plants.snake.jacobian import screws
 from plants.snake.parameters import DRUMS, SnakeParams
 from plants.snake.signals import REST, Drums, Posture
 from plants.snake.statics import Statics
 from plants.snake.tool_target import target_of
 from systems.common.compiled import compiled, packed
+from systems.common.geometry import cross
 from systems.common.parameter import check, parameter, part
 from systems.common.signal import example
 from systems.common.step_block import StepBlock
@@ -40,8 +42,6 @@ SCALE = np.array([0.03, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 """Of a posture's parts against each other, m and rad."""
 DAMPING = 3e-4
 """Of the step, in m/rad: singular directions are left alone."""
-TINY = 1e-7
-"""Of a posture, by which the tool's pose is differentiated."""
 MOST = np.array([0.01, 0.35, 0.35, 0.35, 0.35, 0.35, 0.35])
 """By which a posture is moved at most."""
 FRAMES = 16
@@ -96,12 +96,14 @@ def aimed(
         h: Half the pitch, m.
         tool: The tool's offset, m.
     """
-    A, here, y = np.empty((6, 7)), _pose(x, h, tool), x.copy()
+    J, A = np.empty((6, 7)), np.empty((6, 7))
+    screws(x, h, tool, J)
+    axis = target_of(x, h, tool).n
     for i in range(7):
-        y[i] += TINY
-        column = (_pose(y, h, tool) - here) / TINY * SCALE[i]
-        A[:3, i], A[3:, i] = column[:3], LEVER * column[3:]
-        y[i] = x[i]
+        A[:3, i] = SCALE[i] * J[3:, i]
+        swung = cross((J[0, i], J[1, i], J[2, i]), axis)
+        for k in range(3):
+            A[3 + k, i] = SCALE[i] * LEVER * swung[k]
     goal = off.copy()
     goal[3:] *= LEVER
     rest = astray / SCALE

@@ -16,7 +16,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from plants.snake.balls import BALLS, TURNS, turned_by
+from plants.snake.balls import BALLS, bent_turns
 from plants.snake.friction import turning
 from plants.snake.parameters import MODULES, WIRES, SnakeParams
 from plants.snake.signals import WIRE_NAMES, Numbers, Posture, Tensions
@@ -57,25 +57,6 @@ class TensionEstimatorParams:
         most=0.1,
     )
     period: float = parameter(0.02, "of the samples", "s", least=1e-3, most=0.1)
-
-
-@compiled
-def bent_turns(x: Any, turns: Any) -> None:
-    """R_i (6, 3, 3) of a posture (7,), alike in a module and without torsion."""
-    delta = np.zeros(TURNS)
-    for k in range(MODULES):
-        a, b = x[1 + 2 * k], x[2 + 2 * k]
-        across, along = math.sin(b), -math.sin(a) * math.cos(b)
-        sine = math.hypot(across, along)
-        size = math.atan2(sine, math.cos(a) * math.cos(b))
-        for i in (6 * k, 6 * k + 3):
-            delta[i] = -size * along / (sine if sine > 0.0 else 1.0)
-            delta[i + 1] = size * across / (sine if sine > 0.0 else 1.0)
-    straight = np.zeros((BALLS, 3, 3))
-    for i in range(BALLS):
-        for k in range(3):
-            straight[i, k, k] = 1.0
-    turned_by(straight, delta, turns)
 
 
 @compiled

@@ -32,6 +32,8 @@ from systems.motion.tool_navigation import (
 P_WG = (0.0, 0.0, 0.0)
 WIDE_CONE = ViewCone((0.0, -0.05, 0.0), (0.0, 0.0, -1.0), 1.4)
 TARGET = example(Estimate)._replace(p=(0.03, 0.0, -0.1))
+LOST = TARGET._replace(known=0.0)
+LOADED = Permission(0.0, float(Stop.WALL_LOADED))
 
 
 def run(v_R, seconds=0.5, s=0.5, params=None, **changes):
@@ -152,9 +154,10 @@ def test_why_the_robot_stands(changes, stop):
         ({}, True),
         ({"target": TARGET._replace(known=0.0)}, True),
         ({"permission": Permission(0.0, float(Stop.PROBING))}, True),
-        ({"permission": Permission(0.0, float(Stop.WALL_LOADED))}, False),
-        ({"obstacles": [TARGET._replace(known=0.0)]}, True),
-        ({"obstacles": [TARGET._replace(known=0.0, sigma_p=1.0)]}, False),
+        ({"permission": LOADED}, False),
+        ({"obstacles": [LOST]}, True),
+        ({"obstacles": [LOST], "permission": LOADED}, False),
+        ({"obstacles": [LOST._replace(sigma_p=1.0)]}, False),
     ],
 )
 def test_out_of_a_tools_way_it_is_faster_and_leaves_the_view(changes, goes):

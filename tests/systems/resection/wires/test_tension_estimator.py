@@ -13,7 +13,6 @@ from plants.snake.statics import Statics
 from systems.resection.wires.tension_estimator import (
     TensionEstimator,
     TensionEstimatorParams,
-    bent_turns,
 )
 
 BETAS = 0.3 * np.sin(np.linspace(0.0, 4.0 * np.pi, 81))
@@ -64,9 +63,3 @@ def test_tips_are_within_their_bounds(way):
 def test_a_wrong_coefficient_that_is_trusted_gives_wrong_bounds(way):
     assert bounds(way, wire=0.07, doubt=0.0, margin=0.0)[0] < 0.9
     assert bounds(way, wire=0.07, doubt=0.5)[0] == 1.0
-
-
-def test_balls_are_bent_as_the_posture_says():
-    x, turns = posture_of([0.0, 0.7, 0.3, -1.3, 0.0, 2.7, 0.6]), np.empty((6, 3, 3))
-    bent_turns(x, turns)
-    np.testing.assert_allclose(turns, turns_of(x), atol=1e-12)
