@@ -30,7 +30,8 @@ def clearance(run: Any) -> Figure:
             upper.plot(time, far, color=COLORS[who], label=name)
     upper.axhline(0.0, color="k", lw=0.8)
     upper.set(ylabel="clearance [mm]", ylim=(-6.0, FARTHEST), xlim=(time[0], time[-1]))
-    upper.legend(ncols=3, loc="upper right")
+    if upper.lines[1:]:  # of what is not far all the time
+        upper.legend(ncols=3, loc="upper right")
     lower = add_axes(figure, 2, 1, 2, sharex=upper)
     status = run.planner.clearance
     lower.plot(time, status.change * MM, color=COLORS["robot"], label="changed")

@@ -54,6 +54,7 @@ class TrackedTool(Block):
 
     def _update(self, context: Any) -> tuple[np.ndarray, np.ndarray]:
         tip = view(Sighting, self._sighting.Eval(context)).tip
+        tip = np.where(np.isfinite(tip), tip, np.nan)
         last = context.get_discrete_state(self._last).value()
         v = (tip - last) / self._period
         return np.where(np.isfinite(v), v, 0.0), tip
