@@ -41,7 +41,7 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     before = numba.config.CACHE_LOCATOR_CLASSES
     numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.InTree,{__name__}.UserWide"
     filed = Path(function.__code__.co_filename).is_file()  # not in a notebook
-    compile_: Any = numba.njit(error_model="numpy")
+    compile_: Any = numba.njit(error_model="numpy", no_cfunc_wrapper=True)
     result = compile_(function)
     try:
         if filed:
