@@ -156,6 +156,8 @@ FIGURES = {
     "execution_time": Figure("s", "simulated"),
     "resumed_at": Figure("s", "where an interrupted execution went on"),
     "path_length": Figure("m", "of the tool"),
+    "time_waited": Figure("s", "of the robot, with no procedure to be begun"),
+    "choices": Figure("", "made while it worked: when, the line, the answer"),
     "refusals": Figure("", "procedures that cannot be, and why"),
     "unreached": Figure("", "parts that stay"),
 }

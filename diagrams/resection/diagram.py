@@ -20,6 +20,8 @@ from plants.snake.balls import ball_posture
 from plants.snake.looks import draw_channel
 from plants.snake.snake import add_snake, set_default_posture
 from plants.tissue.tissue_carver import Carving, TissueCarver
+from systems.resection.wires.online_player import OnlinePlayer
+from systems.resection.wires.procedure_chooser import ProcedureChooser
 from systems.resection.wires.procedure_player import ProcedurePlayer
 
 RESECTION_WIRES = (
@@ -29,6 +31,17 @@ RESECTION_WIRES = (
     ("procedure_player.entry", "tissue_carver.entry"),
     ("procedure_player.tool", "tissue_carver.tool"),
 )
+
+ONLINE_WIRES = (
+    ("procedure_chooser.accepted", "procedure_player.accepted"),
+    ("procedure_player.taken", "procedure_chooser.taken"),
+)
+"""Besides, where procedures are chosen while the robot works."""
+
+ONLINE_EXPORTS = {
+    "plan.taken": "procedure_player.taken",
+    "plan.waiting": "procedure_player.waiting",
+}
 
 EXPORTS = {
     "tip.reference": "procedure_player.reference",
@@ -50,17 +63,24 @@ def make_blocks(case: Operation) -> dict[str, Any]:
     """The blocks of the diagram, by the names that the wires use."""
     s, postures, done = case.scenario, case.session.postures, case.done
     start = postures[done.posture].tolist()
+    player = replace(s.player, lead=s.period)
+    plays: dict[str, Any]
+    if case.choosing is not None:
+        book = case.choosing.book
+        plays = {
+            "procedure_player": OnlinePlayer(player, s.snake, book.pages, done.posture),
+            "procedure_chooser": ProcedureChooser(book, s.period),
+        }
+    else:
+        told = case.waits, case.session.entries, case.session.tool_radii
+        plays = {
+            "procedure_player": ProcedurePlayer(
+                player, s.snake, postures, done.posture, *told
+            )
+        }
     return {
         **snake_chain(s, s.snake, start),
-        "procedure_player": ProcedurePlayer(
-            replace(s.player, lead=s.period),
-            s.snake,
-            postures,
-            done.posture,
-            case.waits,
-            case.session.entries,
-            case.session.tool_radii,
-        ),
+        **plays,
         "tissue_carver": TissueCarver(
             replace(s.carver, period=s.period),
             s.snake,
@@ -101,6 +121,8 @@ def make_resection_diagram(
     blocks = add_blocks(builder, make_blocks(case), swaps)
     systems = blocks | {"plant": plant, "scene_graph": scene_graph}
     wires, exports = snake_wires(scenario), snake_exports(scenario)
+    if case.choosing is not None:
+        wires, exports = wires + ONLINE_WIRES, exports | ONLINE_EXPORTS
     return finish(
         builder,
         "resection",

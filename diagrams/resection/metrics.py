@@ -51,6 +51,18 @@ def single_step_share(runs: list[NDArray]) -> float:
     return single / whole if whole > 0.0 else 0.0
 
 
+def times_of(run: Any) -> NDArray:
+    """When each posture of the plan was reached, in s, (n,); 0 for those before."""
+    if run.case.choosing is None:
+        station = run.diagram.GetSubsystemByName("station")
+        times: NDArray = station.GetSubsystemByName("procedure_player").times
+        return times
+    reached, time = run.plan.progress.posture, run.signals["time"]
+    numbers = np.arange(len(run.case.session.postures))
+    index = np.minimum(np.searchsorted(reached, numbers), len(time) - 1)
+    return np.where(numbers <= run.case.done.posture, 0.0, time[index])
+
+
 def body_error(run: Any) -> NDArray:
     """How far the snake is from where it is to be, each corner in m, (n, 8).
 
@@ -71,14 +83,20 @@ def body_error(run: Any) -> NDArray:
 def _free(run: Any) -> dict[str, Any]:
     """What is told of a snake of free balls besides."""
     return {
-        "max_body_error": float(body_error(run)[:, :-1].max()),
+        "max_body_error": None
+        if run.case.choosing  # no profile is that of the whole plan
+        else float(body_error(run)[:, :-1].max()),
         **ball_figures(run),
     }
 
 
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
-    session, reach = run.case.session, run.case.reach
+    session, reach, choosing = run.case.session, run.case.reach, run.case.choosing
+    planning = run.case.planning_time
+    if choosing:
+        reach = choosing.console.reach
+        planning += choosing.planning_time
     removed, touched = run.tissue.removed, run.tissue.touched
     nearest = float(touched.critical_distance[-1])
     error = np.linalg.norm(run.snake.tool.p - run.tip.reference.p, axis=1)
@@ -108,13 +126,14 @@ def measure(run: Any) -> dict[str, Any]:
         "strokes": len(runs),
         "single_step_share": single_step_share(runs),
         "access_time": run.case.access_time,
-        "planning_time": run.case.planning_time,
+        "planning_time": planning,
         "reach_time": reach.time,
         "execution_time": run.case.done.time + run.simulated,
         "resumed_at": run.case.done.time,
         "path_length": float(run.tissue.way.length[-1]),
         "max_tool_error": float(error.max()),
         "rms_tool_error": float(np.sqrt(np.mean(error**2))),
+        **(choosing.figures(run) if choosing else {}),
         **(_free(run) if is_free(run.scenario) else {}),
         "refusals": run.case.refusals,
         "unreached": [

@@ -50,6 +50,8 @@ class Operation(Case):
         access_time: Of proposing the entry and setting the session up, in s.
         planning_time: Of the procedures' checks and the planner, in s.
         done: What earlier runs carried out of the plan.
+        choosing: What chooses while the robot works, an `online.Choosing`; None if all
+            is planned before.
     """
 
     session: Session
@@ -59,16 +61,22 @@ class Operation(Case):
     access_time: float = 0.0
     planning_time: float = 0.0
     done: Execution = field(default_factory=Execution)
+    choosing: Any = None
 
     @property
     def waits(self) -> NDArray[np.float64]:
         """Time spent at each posture of the plan, in s, (n,)."""
-        waits = np.zeros(len(self.session.postures))
-        for channel in self.session.volume.more:
-            waits[channel.time - 1] = self.scenario.entries.time
-        for tool in self.session.tools:
-            waits[tool.time - 1] = self.scenario.balls.time
-        return waits
+        return waits_of(self.session, self.scenario)
+
+
+def waits_of(session: Session, scenario: ResectionScenario) -> NDArray[np.float64]:
+    """Time spent at each posture of a plan, in s, (n,)."""
+    waits = np.zeros(len(session.postures))
+    for channel in session.volume.more:
+        waits[channel.time - 1] = scenario.entries.time
+    for tool in session.tools:
+        waits[tool.time - 1] = scenario.balls.time
+    return waits
 
 
 def tissue_of(scenario: ResectionScenario) -> Tissue:
@@ -178,7 +186,9 @@ def prepare(scenario: ResectionScenario, progress: Progress) -> Operation:
                     "text": answer.text,
                 }
             )
-    if scenario.automatic:
+    if scenario.choices is not None:
+        pass  # it is chosen while the robot works
+    elif scenario.automatic:
         reach = finish_plan(session, reach, scenario, progress)
     elif session.steps and session.steps[-1].kind != "home":
         session.go_home()
@@ -304,7 +314,9 @@ def run_planner(
 
 
 def length(case: Operation) -> float:
-    """How long the run takes in s."""
+    """How long the run takes in s; at most, if it is chosen while the robot works."""
+    if case.scenario.choices is not None:
+        return case.scenario.duration
     player = replace(case.scenario.player, lead=case.scenario.period)
     first = case.done.posture
     times = schedule(case.session.postures[first:], player, case.waits[first:])

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 import numpy as np
 
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
-from diagrams.resection.metrics import carving_of
+from diagrams.resection.metrics import carving_of, times_of
 from diagrams.resection.replay import coarse, shown_spacing
 from plants.tissue.labels import BRAIN, CAP, CHANNEL, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
@@ -151,8 +151,7 @@ def _timeline(axes: Any, run: Any) -> None:
     axes.plot(time / 60, 100 * share, color=COLORS["robot"], lw=1.6)
     reach = 100 * run.case.reach.fraction
     axes.axhline(reach, color=COLORS["target"], lw=1.0, ls="--")
-    station = run.diagram.GetSubsystemByName("station")
-    times = (before + station.GetSubsystemByName("procedure_player").times) / 60
+    times = (before + times_of(run)) / 60
     colors = step_colors(session.steps)
     axes.set(
         xlabel="time [min]",

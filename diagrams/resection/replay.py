@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.geometry import Rgba
 from pydrake.math import RigidTransform
 
-from diagrams.resection.metrics import carving_of
+from diagrams.resection.metrics import carving_of, times_of
 from plants.snake.last_module import meridian
 from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
@@ -157,8 +157,7 @@ def dome(
 def _elementary_volumes(meshcat: Any, animation: Any, run: Any) -> None:
     """Each elementary procedure's first volume, while it is carried out."""
     session = run.case.session
-    player = run.diagram.GetSubsystemByName("station")
-    times = player.GetSubsystemByName("procedure_player").times / run.replay_speed
+    times = times_of(run) / run.replay_speed
     params = session.params
     for number, step in enumerate(session.steps):
         if step.kind not in ("elementary", "volume") or step.procedure is None:

@@ -101,6 +101,12 @@ class ResectionScenario(FreeBallsParams, Scenario):
         [], "the surgeon's, in their order; refused ones are left out", shape=(-1,)
     )
     automatic: bool = parameter(False, "whether the planner goes on after them")
+    choices: str | None = parameter(
+        None,
+        "CSV `t,line` of the console's lines said while the robot works, after the "
+        "procedures; '': by who is there",
+        file=True,
+    )
     planner: PlannerParams = part(PlannerParams)
     entries: EntriesParams = part(EntriesParams)
     balls: ToolsParams = part(ToolsParams)
@@ -142,6 +148,6 @@ class ResectionScenario(FreeBallsParams, Scenario):
         yield from super().rules()
         for index, procedure in enumerate(self.procedures):
             check_procedure(procedure, self.snake, f"procedures[{index}]")
-        for name in ("mask", "image"):
+        for name in ("mask", "image", "choices"):
             file = getattr(self, name)
             yield not file or Path(file).is_file(), name, "a file that is there"

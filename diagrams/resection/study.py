@@ -8,13 +8,8 @@ from diagrams.common.study import Study, View, cenic
 from diagrams.resection.diagram import make_resection_diagram
 from diagrams.resection.live import LIVE
 from diagrams.resection.metrics import measure
-from diagrams.resection.operation import (
-    LOG_PERIOD,
-    Operation,
-    length,
-    outline,
-    prepare,
-)
+from diagrams.resection.online import is_over, outline, prepare
+from diagrams.resection.operation import LOG_PERIOD, Operation, length
 from diagrams.resection.plots import plots
 from diagrams.resection.replay import decorate
 from diagrams.resection.scenario import ResectionScenario
@@ -23,6 +18,7 @@ from plants.snake.signals import ToolPose
 from plants.tissue.execution import save_execution
 from plants.tissue.tissue_carver import Moves, Removed, Touched, Way
 from systems.common.archive import beside
+from systems.resection.wires.online_player import Taken, Waiting
 from systems.resection.wires.procedure_player import Progress
 from systems.resection.wires.resection_ik import IkStatus
 from systems.resection.wires.snake_location import Bends
@@ -43,10 +39,13 @@ SIGNALS = {
     "watch.alarm": Alarm,
 }
 
+ONLINE_SIGNALS = {"plan.taken": Taken, "plan.waiting": Waiting}
+
 
 def signals(scenario: ResectionScenario) -> dict[str, Any]:
     """What is logged of a scenario."""
-    return SIGNALS | (STATICS_SIGNALS if is_free(scenario) else {})
+    online = {} if scenario.choices is None else ONLINE_SIGNALS
+    return SIGNALS | online | (STATICS_SIGNALS if is_free(scenario) else {})
 
 
 SAVE_EVERY = 5.0
@@ -84,6 +83,7 @@ STUDY = Study(
     frame_rate=10.0,
     length=length,
     keep=keep,
+    ending=lambda case, station: lambda context: is_over(case, station, context),
     prepare=prepare,
     outline=outline,
     replay_length=45.0,

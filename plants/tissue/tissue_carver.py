@@ -23,7 +23,7 @@ from plants.snake.snake_body import (
 from plants.tissue.execution import Execution
 from plants.tissue.labels import CHANNEL, TUMOUR
 from plants.tissue.space import Space, in_voxels, stamp
-from plants.tissue.volume import Volume
+from plants.tissue.volume import Channel, Volume
 from systems.common.block import Block
 from systems.common.compiled import Numbers, compiled
 from systems.common.geometry import along, norm, sub, xyz
@@ -189,7 +189,7 @@ class Carving:
             done: What has been carried out before.
         """
         self.volume = volume.fresh()
-        self.channels = volume.more
+        self.planned = volume
         self.done = done or Execution()
         if self.done.tau is not None:
             self.volume.tau[:] = self.done.tau
@@ -205,6 +205,11 @@ class Carving:
         self.critical: NDArray[np.float32] = volume.to_critical.reshape(-1)
         self.latest = self.done.index
         self.space: Space = self.volume.space()
+
+    @property
+    def channels(self) -> list[Channel]:
+        """The plan's, which may grow while it is carried out."""
+        return self.planned.more
 
     def move(
         self,

@@ -295,8 +295,8 @@ class Volume:
         copy.tau = np.where(start, 0, SOLID).astype(np.int32)
         copy._journals = journals(self.labels.size)
         copy.refresh()
-        if copy.more:
-            copy.more = []
+        copy.more = []
+        if self.more:
             copy.allow()
         return copy
 

@@ -194,6 +194,7 @@ COMMANDS = {
     "HandNavigation": {"tool": TOOL},
     "HysteresisCompensation": {"drums": HELD},
     "JointCommands": {"posture": HELD, "set_point": HELD},
+    "OnlinePlayer": {"target": HELD},
     "OrcaPlanner": {"v_R": RATE},
     "PassiveWristEmulation": {"tool": TOOL},
     "PretensionControl": {"drums": HELD},
@@ -223,7 +224,7 @@ OBSERVE = {
     *("BallLocation", "Registration", "TipLoad", "ToolLoad", "WrenchWatch"),
     *("NavigationMonitor", "TissueForce", "WallWrench"),
     *("GuidedDisc", "SensorZeroing", "TensionEstimator", "ToolTracker"),
-    *("BaseSensor", "ContactWatch"),
+    *("BaseSensor", "ContactWatch", "ProcedureChooser"),
 }
 """Blocks that command nothing."""
 LEAD = {"Outside", "ProcedurePlayer", "TipReference"}

@@ -49,6 +49,13 @@ class ProcedurePlayerParams:
     dwell: float = parameter(
         0.3, "at the beginning and at the end", "s", above=0.0, most=60.0
     )
+    ahead: float = parameter(
+        1.0,
+        "before the end of a procedure at which the next is taken, on line",
+        "s",
+        least=0.2,
+        most=60.0,
+    )
 
     @property
     def turn(self) -> float:
