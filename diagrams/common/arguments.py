@@ -36,12 +36,18 @@ is saved after every commit, and resumed.
   trocar resect resect_paper < lines.txt   the same lines again
   trocar resect resect_paper --browser     by sliders and buttons
   trocar resect resect_mask --browser --set mask=tumour.nii.gz --set image=t1.nii.gz
+  trocar resect resect_paper --execute     the robot works while one chooses the next
 
 In the browser sliders place the procedure, and how it would go is shown at once: what
 it frees in green, or red if it is refused, with the first thing in the way marked in
 pink and named below. A click into a slice moves the procedure there. The buttons are
 the console's commands, and what they did is listed as its lines: planned by clicks or
 by lines, the session is the same. `stop` ends a long `finish`, Ctrl-C or `end` all.
+
+With --execute the robot begins what is committed, goes on with what is committed
+meanwhile, and waits while nothing is. `stop` lets it begin no further step, `go` lets
+it go on, `end` or `quit` sends it home when all is done. Lines of a pipe are all said
+at the beginning; with times, see `trocar keys resect_paper choices`.
 """
 
 
@@ -169,6 +175,17 @@ def make_parser() -> argparse.ArgumentParser:
     )
     resect.add_argument(
         "--browser", action="store_true", help="sliders, buttons and slices instead"
+    )
+    resect.add_argument(
+        "--execute",
+        action="store_true",
+        help="the robot carries out what is committed, at once",
+    )
+    resect.add_argument(
+        "--speed", type=float, default=1.0, help="of its time; default: 1"
+    )
+    resect.add_argument(
+        "--out", metavar="DIR", type=Path, help="of what it did; default: out/NAME"
     )
     listens(resect)
     export = commands.add_parser(

@@ -8,6 +8,7 @@ import logging
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from diagrams.common.arguments import make_parser
 from diagrams.common.progress import progress_bar
@@ -202,6 +203,8 @@ def resect_command(arguments: argparse.Namespace) -> int:
         raise ScenarioError(f"{arguments.name!r} is no resection")
     name = default_name(arguments.name)
     file = arguments.session or Path("out") / f"{name}.session"
+    if arguments.execute:
+        return execute(arguments, scenario, file)
     if not arguments.browser:
         run_console(scenario, file, sys.stdin, sys.stdin.isatty())
         return 0
@@ -216,6 +219,25 @@ def resect_command(arguments: argparse.Namespace) -> int:
     run_browser(scenario, file, arguments.host, opened)
     print(f"session {file}; `trocar export {file} --to DIR` is for a viewer")
     return 0
+
+
+def execute(arguments: argparse.Namespace, scenario: Any, file: Path) -> int:
+    """Runs `trocar resect --execute`."""
+    from diagrams.common.figures import table
+    from diagrams.resection.operate import operate
+
+    if arguments.browser:
+        raise ScenarioError("--execute: lines only; expected no --browser with it")
+    if not 0.0 < arguments.speed <= 100.0:
+        raise ScenarioError(f"--speed {arguments.speed}: expected > 0 and <= 100")
+    by_hand = sys.stdin.isatty()
+    out = arguments.out or Path("out") / default_name(arguments.name)
+    print(f"session {file}; `help` lists the commands")
+    run = operate(scenario, file, sys.stdin, out, arguments.speed if by_hand else 0.0)
+    if run.metrics:
+        print(table(run.metrics))
+    print(f"\n{out}/: trocar replay {out}, trocar run {out / 'scenario.yaml'}")
+    return 1 if run.error else 0
 
 
 def export_command(arguments: argparse.Namespace) -> int:

@@ -325,11 +325,14 @@ def run_scenario(
     `metrics.json`, the plots as PNG, `replay.html`, `provenance.json` and
     `report.html`, in this order, so that nothing computed is lost if a later one
     fails. What an earlier run left there stays until this one begins, and then goes.
+    Instead of a scenario a case of one is taken, too.
 
     Raises:
         ScenarioError: If the scenario cannot run, the folder not be written, or
             another run writes to it.
     """
+    case = scenario if isinstance(scenario, Case) else None
+    scenario = case.scenario if case else scenario
     check_scenario(scenario)
     if with_film:
         can_film = get_study(scenario.system).can_film
@@ -337,7 +340,7 @@ def run_scenario(
             raise ScenarioError(f"--endoscope: {scenario.system} has no endoscope")
         can_film()
     with results(out) as into:
-        case = prepare(scenario, progress)
+        case = case or prepare(scenario, progress)
         diagram = build(case)
         meshcat = replay.start_meshcat() if with_replay else None
         try:

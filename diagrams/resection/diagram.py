@@ -35,6 +35,7 @@ RESECTION_WIRES = (
 ONLINE_WIRES = (
     ("procedure_chooser.accepted", "procedure_player.accepted"),
     ("procedure_player.taken", "procedure_chooser.taken"),
+    ("procedure_player.waiting", "procedure_chooser.waiting"),
 )
 """Besides, where procedures are chosen while the robot works."""
 

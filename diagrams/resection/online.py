@@ -101,7 +101,7 @@ class OnlineConsole(Console):
             return "no further step is begun" if self.is_stopped else "it goes on"
         if command in ("home", "end") and len(words) == 1:
             self.is_over = command == "end"
-            if steps and steps[-1].kind != "home":
+            if steps and steps[-1].kind != "home" and not self.is_stopped:
                 self.session.go_home()
             return self._share()
         if command == "undo" and steps and steps[-1].first <= self.taken:
@@ -128,6 +128,7 @@ class Choosing:
         told: Of each line answered in this run when it was, the line, and the answer.
         planning_time: Wall time of all answers, in s.
         hear: Called with each line and its answer.
+        heed: Called with the time in s of this run and a `Wait` when that is another.
     """
 
     def __init__(
@@ -147,6 +148,8 @@ class Choosing:
         self.told: list[tuple[float, str, str]] = []
         self.planning_time = 0.0
         self.hear: Callable[[str, str], None] = lambda line, answer: None
+        self.heed: Callable[[float, int], None] = lambda time, reason: None
+        self._reason = int(Wait.PLAYING)
         self._before = done.time
         self._rows: list[tuple[float, int, str]] = []
         if session.file is not None:
@@ -156,15 +159,21 @@ class Choosing:
             if line.strip() in ("stop", "go"):
                 self.console.is_stopped = line.strip() == "stop"
         left = ended(lines, scenario)[count:] if lines is not None else []
-        if lines is not None:
-            del self._rows[count:]
+        del self._rows[count:]
         due = [(max(time - done.time, 0.0), line) for time, line in left]
         self.book = Book(self.page(), self.answer, due)
+        self.book.heed = self._heed
 
     @property
     def lines(self) -> list[Line]:
         """All that was said so far, in this run and those before."""
         return [(time, line) for time, _, line in self._rows]
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the lines, after the scenario's procedures, made the whole plan."""
+        first = self._rows[0][1] if self._rows else 0
+        return first <= len(self.console.scenario.procedures)
 
     def page(self) -> Page:
         """The plan as it stands."""
@@ -196,6 +205,11 @@ class Choosing:
         if self._standing() != before:
             return self.page()
         return replace(last, is_stopped=console.is_stopped, is_over=console.is_over)
+
+    def _heed(self, time: float, reason: int) -> None:
+        if reason != self._reason:
+            self._reason = reason
+            self.heed(time, reason)
 
     def _standing(self) -> tuple[int, ...]:
         session = self.console.session

@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 
 from systems.common.block import Block
-from systems.resection.wires.online_player import Accepted, Page, Taken, standing
+from systems.resection.wires.online_player import (
+    Accepted,
+    Page,
+    Taken,
+    Waiting,
+    standing,
+)
 
 TIGHT = 1e-9
 """By which an instant may be before a line's time, in s."""
@@ -17,6 +23,12 @@ class Book:
     """Lines that choose, and the plan after each: things are only ever added to it.
 
     So a number tells a plan, and a context that holds it holds the plan.
+
+    Attributes:
+        pages: The plan before any line, and after each that was answered.
+        lines: When, in s, and what.
+        hear: What somebody says at a time in s, asked at every instant.
+        heed: Told at every instant the time, and why the robot waits, a `Wait`.
     """
 
     def __init__(
@@ -35,10 +47,14 @@ class Book:
         """
         self.pages = [first]
         self.lines = list(lines)
+        self.hear: Callable[[float], Iterable[str]] = lambda time: ()
+        self.heed: Callable[[float, int], None] = lambda time, reason: None
         self._answer = answer
 
     def due(self, time: float) -> int:
-        """How many lines are due by a time in s."""
+        """How many lines are due by a time in s, those heard just now among them."""
+        for line in self.hear(time):
+            self.say(time, line)
         return bisect_right(self.lines, time + TIGHT, key=lambda line: line[0])
 
     def say(self, time: float, line: str) -> None:
@@ -62,6 +78,7 @@ class ProcedureChooser(Block):
     answered once is not answered again, also in another context.
 
     Port ``taken`` accepts what the robot has `Taken`.
+    Port ``waiting`` accepts why it waits, `Waiting`; nobody heeds it if unconnected.
     Port ``accepted`` emits the `Accepted` page.
     """
 
@@ -83,6 +100,7 @@ class ProcedureChooser(Block):
         self.book = book or Book(standing(4e-3))
         self._choose = choose
         self._taken = self.signal_in("taken", Taken)
+        self._waiting = self.signal_in("waiting", Waiting)
         self.state_out("accepted", Accepted, np.zeros(1))
         self.update_every(period, self._update)
 
@@ -92,6 +110,9 @@ class ProcedureChooser(Block):
         if not np.isfinite(taken):
             return [page]
         book, time, last = self.book, context.get_time(), int(taken)
+        if self._waiting.HasValue(context):
+            (reason,) = self._waiting.Eval(context).tolist()
+            book.heed(time, int(reason) if np.isfinite(reason) else 0)
         number = book.read(max(book.due(time), int(page)), last, time)
         plan = book.pages[number]
         idle = plan.after(last) is None and not plan.is_over and not plan.is_stopped

@@ -1,5 +1,7 @@
 """Procedures chosen while the robot works: as the plan whole, late, and cut off."""
 
+from time import sleep
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from diagrams.common.metrics import WALL_CLOCK
 from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.online import answered, load_choices, save_choices
+from diagrams.resection.operate import operate
 from diagrams.studies import load_scenario
 from plants.tissue.execution import load_execution
 from systems.common.archive import beside
@@ -120,6 +123,29 @@ def test_a_run_cut_off_goes_on_with_the_lines_that_are_left(whole, tmp_path):
     assert done.posture == len(plan) - 1
     for key in ("execution_time", "path_length", "resected_fraction"):
         assert rest.metrics[key] == pytest.approx(planned.metrics[key], rel=0.02), key
+
+
+def test_what_was_typed_plays_back(tmp_path):
+    """Typed while the robot works, at a pace; `quit` stands for `end`."""
+    told: list[str] = []
+
+    def typed():
+        yield f"{ENTRY}\n"
+        yield "commit\n"
+        while not any("no procedure" in text for text in told):
+            sleep(0.01)
+        yield "quit\n"
+
+    scenario = load_scenario("resect_auto_small", [*SMALL, "duration=12.0"])
+    file, out = tmp_path / "s.session", tmp_path / "out"
+    seen = operate(scenario, file, typed(), out, 100.0, told.append, False)
+    assert not seen.error and seen.simulated < 12.0
+    assert told[1].startswith("> commit\ncommitted")
+    assert any("all that was chosen is done" in text for text in told)
+    again = simulate(load_scenario(str(out / "scenario.yaml")))
+    for name, column in seen.signals.items():
+        np.testing.assert_array_equal(column, again.signals[name], err_msg=name)
+    assert [row["line"] for row in again.metrics["choices"]][-1] == "end"
 
 
 def test_lines_that_were_answered_before_a_crash():
