@@ -21,8 +21,8 @@ from systems.common.archive import MAGIC, write_archive
 from systems.resection.planning.draws import new_draws
 from systems.resection.planning.procedure import Procedure
 from systems.resection.planning.reach import Reach, load_reach, save_reach
+from systems.resection.planning.resumed import load_session
 from systems.resection.planning.search import Search, load_search, save_search
-from systems.resection.planning.session import load_session
 from tests.ball import ball_session
 
 ENTRY = Procedure("entry", length=0.016, radius=0.005, pitch=1e-3, name="entry")

@@ -38,7 +38,8 @@ from plants.tissue.mask_reader import READERS
 from plants.tissue.segments import is_dicom, kind_of
 from systems.common.archive import whole
 from systems.common.parameter import parameter
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.resumed import load_session
+from systems.resection.planning.session import Session
 
 type Rows = list[dict[str, Any]]
 

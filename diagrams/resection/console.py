@@ -29,7 +29,8 @@ from systems.resection.planning.procedure import (
     save_procedures,
 )
 from systems.resection.planning.reach import Reach
-from systems.resection.planning.session import Preview, Session
+from systems.resection.planning.session import Session
+from systems.resection.planning.trial import Preview
 
 HELP = """\
 entry LENGTH RADIUS                  propose an entry procedure [mm]

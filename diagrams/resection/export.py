@@ -16,7 +16,8 @@ from plants.tissue.space import SOLID
 from plants.tissue.tissue import Grid
 from plants.tissue.volume import Volume
 from systems.common.archive import beside, whole
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.resumed import load_session
+from systems.resection.planning.session import Session
 
 NOTHING, REMAINING, RESECTED, HEALTHY, BORED, VESSEL = range(6)
 LABELS = ("nothing", "remaining", "resected", "healthy_removed", "bored", "critical")

@@ -31,7 +31,8 @@ from systems.resection.planning.reach import (
     load_reach,
     save_reach,
 )
-from systems.resection.planning.session import UPDATE, Session, load_session
+from systems.resection.planning.resumed import load_session
+from systems.resection.planning.session import UPDATE, Session
 from systems.resection.wires.procedure_player import schedule
 
 LOG_PERIOD = 0.1

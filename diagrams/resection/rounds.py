@@ -24,7 +24,7 @@ from plants.tissue.yielding import YieldingTissue
 from systems.common.archive import before, beside, read_archive, sensible, write_archive
 from systems.resection.planning.planner import Planner
 from systems.resection.planning.reach import find_reach
-from systems.resection.planning.session import load_session
+from systems.resection.planning.resumed import load_session
 from systems.resection.wires.procedure_player import schedule
 
 ROUNDS = 30

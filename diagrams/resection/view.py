@@ -19,7 +19,8 @@ from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
 from plants.tissue.volume import Volume
 from systems.resection.planning.feasibility_map import FeasibilityMap
-from systems.resection.planning.session import Preview, Session
+from systems.resection.planning.session import Session
+from systems.resection.planning.trial import Preview
 
 type Mask = NDArray[np.bool_]
 

@@ -4,13 +4,18 @@ A digest tells damage, not nonsense: indices are looked up by compiled code, and
 counts as removed is removed by nothing but the plan.
 """
 
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from plants.tissue.labels import NAMES
 from plants.tissue.space import SOLID
-from systems.common.archive import Arrays, check_arrays
+from systems.common.archive import Arrays, check_arrays, write_archive
+
+FORMAT = 3
+"""Of a session's file; 2: what is critical as the mask has it; 3: several entries."""
 
 ARRAYS: Arrays = {
     "labels": ("u1", ("x", "y", "z")),
@@ -26,6 +31,48 @@ ARRAYS: Arrays = {
 """Of a session: kinds and shapes, equal letters for equal lengths."""
 CRITICAL: Arrays = {"critical": ("i8", ("critical", 3)), "X_WV": ("f8", (4, 4))}
 """Likewise, of one whose mask holds what is critical."""
+
+
+def write_session(session: Any, path: Path) -> None:
+    """Writes a session; the file before it is kept as `*.before`."""
+    v, t = session.volume, session.tree
+    nodes, visits, home = map(int, t.size)
+    arrays = {
+        "labels": v.labels,
+        "origin": v.origin,
+        "X_PW": v.X_PW,
+        "tau": v.tau,
+        "x": t.x[:nodes],
+        "parent": t.parent[:nodes],
+        "depth": t.depth[:nodes],
+        "tip": t.tip[:nodes],
+        "route": t.route[:visits],
+    }
+    if v.critical is not None:
+        arrays |= {"critical": v.critical.index, "X_WV": v.critical.X_WV}
+    meta = {
+        "format": FORMAT,
+        "spacing": v.spacing,
+        "channel": v.channel,
+        "channel_depth": v.depth,
+        "margin": v.margin,
+        "mask_volume": v.mask_volume,
+        "notes": v.notes,
+        "clearance": session.clearance,
+        "accuracy": session.accuracy,
+        "params": asdict(session.own),
+        "tools": [asdict(tool) for tool in session.tools],
+        "steps": [asdict(step) for step in session.steps],
+        "concluded": session.concluded,
+        "reached": session.reached,
+        "home": home,
+        "image": v.image
+        and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
+        "more": [
+            {"X_WE": c.X_WE.tolist(), "depth": c.depth, "time": c.time} for c in v.more
+        ],
+    }
+    write_archive(path, meta, arrays)
 
 
 def check_saved(meta: dict[str, Any], arrays: dict[str, Any]) -> None:

@@ -1,42 +1,31 @@
 """A resection as a session: propose, check, preview, commit, undo, save, resume."""
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
-from plants.snake.snake_body import CULPRIT, OK, Body, body_of, place
-from plants.tissue.critical import Boxes
+from plants.snake.snake_body import CULPRIT, Body, body_of, place
 from plants.tissue.labels import TUMOUR
-from plants.tissue.space import Space, roll_back
-from plants.tissue.tissue import Grid, Tissue
+from plants.tissue.space import roll_back
+from plants.tissue.tissue import Tissue
 from plants.tissue.volume import Channel, Volume
-from systems.common.archive import read_archive, sensible, write_archive
 from systems.common.parameter import check
 from systems.resection.planning.feasibility import (
-    NEVER,
     Answer,
-    check_jam,
-    check_reach,
-    explain,
     refused,
-    tips_of,
 )
+from systems.resection.planning.home import home_posture
 from systems.resection.planning.procedure import (
     Procedure,
     Tool,
     ToolChange,
-    check_procedure,
-    procedure_of,
-    widest_bend,
     with_tool,
 )
-from systems.resection.planning.saved import check_removed, check_saved
-from systems.resection.planning.sweep import LIMIT, posture_at, sweep_procedure
+from systems.resection.planning.saved import write_session
 from systems.resection.planning.tree import (
     Tree,
     copied,
@@ -46,16 +35,12 @@ from systems.resection.planning.tree import (
     go_to,
     grown,
     here,
-    nearest_nodes,
     new_tree,
-    tree_of,
 )
+from systems.resection.planning.trial import Preview, Trial, try_out
 
 ROOM = 60_000
 """Nodes, and visits, that one step of a session may need."""
-
-FORMAT = 3
-"""Of a session's file; 2: what is critical as the mask has it; 3: several entries."""
 
 STROKES = "strokes"
 """Kind of a step that is no procedure: see `strokes`."""
@@ -68,9 +53,6 @@ ACCESS = "access"
 
 TOOL = "tool"
 """Kind of a step in which the tool is changed."""
-
-STARTS = 24
-"""Nodes from which a procedure's start is tried."""
 
 
 @dataclass
@@ -96,24 +78,6 @@ class Step:
     nodes: int
     gained: float
     procedure: Procedure | None = None
-
-
-@dataclass
-class Preview:
-    """A procedure as it would go.
-
-    Attributes:
-        answer: Whether it is feasible now.
-        tips: Where its tool goes if nothing is in the way, in W in m, (n, 3).
-        freed: Flat indices of the tumour's voxels that it frees; if it is refused,
-            before that.
-        posture: The robot where it ends, or comes to a stand, (7,).
-    """
-
-    answer: Answer
-    tips: NDArray[np.float64]
-    freed: NDArray[np.int32]
-    posture: NDArray[np.float64]
 
 
 @dataclass
@@ -192,22 +156,23 @@ class Session:
 
     def preview(self, procedure: Procedure) -> Preview:
         """How a procedure would go now, to be drawn; nothing changes."""
-        answer, s = self._do(procedure), self.volume.space()
+        trial, s = try_out(self, procedure), self.volume.space()
         tree, freed = self.tree, s.freed[: s.used[0]].copy()
         posture = tree.x[tree.route[tree.size[1] - 1]].copy()
-        self._take_back(self._mark)
-        return Preview(answer, self._tips, freed, posture)
+        self._take_back(trial)
+        return Preview(trial.answer, trial.tips, freed, posture)
 
     def commit(self, procedure: Procedure) -> Answer:
         """Makes a procedure part of the plan if it is feasible."""
         before = self.standing()
-        answer = self._do(procedure)
+        trial = try_out(self, procedure)
+        answer = trial.answer
         if answer.feasible and with_tool(self.params, procedure.tool) != self.params:
             answer = refused(
                 "limit", None, 0.0, "the robot carries another tool: change it first"
             )
         if not answer.feasible:
-            self._take_back(self._mark)
+            self._take_back(trial)
             return answer
         self.record(procedure.name or procedure.kind, procedure.kind, before, procedure)
         return answer
@@ -245,9 +210,9 @@ class Session:
             int(np.count_nonzero(self.volume.resected)),
         )
 
-    def _take_back(self, mark: tuple[int, int, int, int]) -> None:
-        roll_back(self.volume.space(), mark[0], mark[1])
-        cut(self.tree, *mark[2:])
+    def _take_back(self, trial: Trial) -> None:
+        roll_back(self.volume.space(), 0, 0)
+        cut(self.tree, trial.nodes, trial.visits)
 
     def make_room(self) -> None:
         """Sees to it that a step's nodes fit into the tree."""
@@ -259,101 +224,6 @@ class Session:
         return bool(tree.size[0] + ROOM // 3 < len(tree.x)) and bool(
             tree.size[1] + 4 * ROOM // 3 < len(tree.route)
         )
-
-    def _do(self, procedure: Procedure) -> Answer:
-        """Carries a procedure out in thought.
-
-        `_mark` is how it was before, `_tips` where its tool goes.
-        """
-        self.volume.forget_journals()
-        self.make_room()
-        self._mark = (0, 0, int(self.tree.size[0]), int(self.tree.size[1]))
-        self._tips = np.empty((0, 3))
-        check_procedure(procedure, self.params)
-        params = with_tool(self.params, procedure.tool)
-        body = self.body
-        if procedure.tool is not None:
-            body = body_of(params, self.clearance, self.accuracy)
-        own, start = self._in_entry(procedure, params)
-        clearance = self.volume.channel - params.body_radius
-        refusal = check_jam(
-            procedure, clearance, params, self.clearance, self.accuracy
-        ) or check_reach(own, start, params)
-        if refusal:
-            if refusal.where is not None:
-                refusal.where = (self.X_WE @ [*refusal.where, 1.0])[:3].tolist()
-            return refusal
-        R_WE, o = self.X_WE[:3, :3], self.X_WE[:3, 3]
-        n, s = R_WE @ own.axis(), self.volume.space()
-        x = np.empty(7)
-        O2 = R_WE @ start + o - (params.straight_module + params.tool_offset) * n
-        tips = self._tips = tips_of(own, start, params) @ R_WE.T + o
-        start = R_WE @ start + o
-        status = posture_at(body, O2, n, x)
-        if status == OK:
-            status = self._approach(s, body, x)
-        if status == OK:
-            status = sweep_procedure(
-                s,
-                body,
-                self.tree,
-                n,
-                procedure.length,
-                procedure.pitch,
-                widest_bend(procedure, params),
-                procedure.pitch,
-                not procedure.clipped,
-                self.why,
-            )
-        poses = int(self.tree.size[1]) - self._mark[3]
-        gained = int(self.volume.space().used[0]) * self.volume.voxel
-        if status != OK:
-            answer = explain(
-                self.volume, status, self.why, tips, params.tool_radius, body.face
-            )
-            answer.poses = poses
-            return answer
-        if procedure.clipped and gained == 0.0:
-            return refused(
-                NEVER, start, 0.0, "nothing of it can be reached, or is left"
-            )
-        text = f"feasible: removes {1e9 * gained:.0f} mm3 in {poses} poses"
-        return Answer(True, text=text, gained=gained, poses=poses)
-
-    def _in_entry(
-        self, procedure: Procedure, params: SnakeParams
-    ) -> tuple[Procedure, NDArray[np.float64]]:
-        """A procedure as the entry's frame has it, and where its tool starts there."""
-        if procedure.position is None or procedure.direction is None:
-            return procedure, np.array(
-                [0.0, 0.0, self.volume.depth - params.tool_radius]
-            )
-        X_EW = np.linalg.inv(self.X_WE)
-        start = X_EW[:3, :3] @ np.array(procedure.position) + X_EW[:3, 3]
-        axis = X_EW[:3, :3] @ np.array(procedure.direction)
-        own = replace(procedure, position=start.tolist(), direction=axis.tolist())
-        return own, start
-
-    def _approach(self, s: Space, body: Body, x: NDArray[np.float64]) -> int:
-        """Drives to a posture from the nearest node that has a free way to it."""
-        c = np.empty((POINTS, 3))
-        place(body, x, c)
-        found, far = np.empty(STARTS, np.int64), np.empty(STARTS)
-        nearest_nodes(self.tree, c[7], found, far)
-        blamed, best, status = None, -1.0, LIMIT
-        for node in [int(self.tree.size[2]), *found[found >= 0].tolist()]:
-            freed, roomed = int(s.used[0]), int(s.used[1])
-            new = extend(s, body, self.tree, int(node), x, self.why)
-            if new >= 0:
-                return OK
-            roll_back(s, freed, roomed)
-            # The culprit of the attempt that came nearest to the goal is named.
-            near = -float(np.linalg.norm(self.why[1:4] - c[7]))
-            if blamed is None or near > best:
-                blamed, best, status = self.why.copy(), near, -new
-        if blamed is not None:
-            self.why[:] = blamed
-        return status
 
     def record(
         self,
@@ -522,123 +392,4 @@ class Session:
 
     def save(self, path: Path) -> None:
         """Writes the session; the file before it is kept as `*.before`."""
-        v, t = self.volume, self.tree
-        nodes, visits, home = map(int, t.size)
-        arrays = {
-            "labels": v.labels,
-            "origin": v.origin,
-            "X_PW": v.X_PW,
-            "tau": v.tau,
-            "x": t.x[:nodes],
-            "parent": t.parent[:nodes],
-            "depth": t.depth[:nodes],
-            "tip": t.tip[:nodes],
-            "route": t.route[:visits],
-        }
-        if v.critical is not None:
-            arrays |= {"critical": v.critical.index, "X_WV": v.critical.X_WV}
-        meta = {
-            "format": FORMAT,
-            "spacing": v.spacing,
-            "channel": v.channel,
-            "channel_depth": v.depth,
-            "margin": v.margin,
-            "mask_volume": v.mask_volume,
-            "notes": v.notes,
-            "clearance": self.clearance,
-            "accuracy": self.accuracy,
-            "params": asdict(self.own),
-            "tools": [asdict(tool) for tool in self.tools],
-            "steps": [asdict(step) for step in self.steps],
-            "concluded": self.concluded,
-            "reached": self.reached,
-            "home": home,
-            "image": v.image
-            and {"sizes": list(map(int, v.image.sizes)), "X_PI": v.image.X_PI.tolist()},
-            "more": [
-                {"X_WE": c.X_WE.tolist(), "depth": c.depth, "time": c.time}
-                for c in v.more
-            ],
-        }
-        write_archive(path, meta, arrays)
-
-
-def load_session(path: Path) -> Session:
-    """Resumes a session from its file.
-
-    Raises:
-        ValueError: If the file is not there or damaged, and the one before is offered;
-            or if what it says makes no sense.
-    """
-    meta, arrays = read_archive(path, "session", FORMAT)
-    with sensible(path, "session"):
-        session = _restored(meta, arrays)
-    session.file = path
-    return session
-
-
-def _restored(meta: dict[str, Any], arrays: dict[str, Any]) -> Session:
-    """The session of a file's plain data and arrays, held against each other."""
-    check_saved(meta, arrays)
-    volume = Volume(
-        arrays["labels"],
-        arrays["origin"],
-        meta["spacing"],
-        meta["channel"],
-        meta["channel_depth"],
-        arrays["X_PW"],
-        meta["margin"],
-        arrays["tau"],
-        Boxes(arrays["critical"], arrays["X_WV"]) if "critical" in arrays else None,
-        mask_volume=meta["mask_volume"],
-        notes=meta["notes"],
-        image=meta.get("image")
-        and Grid(tuple(meta["image"]["sizes"]), np.array(meta["image"]["X_PI"])),
-        more=[
-            Channel(np.array(row["X_WE"]), row["depth"], row["time"])
-            for row in meta["more"]
-        ],
-    )
-    session = Session(
-        volume, SnakeParams(**meta["params"]), meta["clearance"], meta["accuracy"]
-    )
-    session.tree = tree_of(
-        arrays["x"],
-        arrays["parent"],
-        arrays["depth"],
-        arrays["tip"],
-        arrays["route"],
-        meta["home"],
-        ROOM,
-        ROOM,
-    )
-    for row in meta.get("tools", ()):
-        tool = ToolChange(float(row["radius"]), int(row["time"]))
-        with_tool(session.own, Tool(tool.radius, session.own.tool_offset))
-        if not 0 < tool.time < len(arrays["route"]):
-            raise ValueError(f"a tool at no visit: {tool.time}")
-        session.tools.append(tool)
-    session.stand()
-    for row in meta["steps"]:
-        row["procedure"] = row["procedure"] and procedure_of(row["procedure"])
-        session.steps.append(Step(**row))
-    session.concluded = meta["concluded"]
-    session.reached = list(map(float, meta.get("reached", ())))
-    check_removed(session)
-    return session
-
-
-def home_posture(volume: Volume, params: SnakeParams) -> NDArray[np.float64]:
-    """Straight in the channel, the tool just within its end, (7,).
-
-    Raises:
-        ValueError: If the translation does not reach so far back.
-    """
-    straight = 3 * params.straight_module + params.tool_offset
-    s = volume.depth - params.tool_radius - straight
-    low, high = params.travel
-    if not low <= s <= high:
-        raise ValueError(
-            f"home needs a translation of {s:.4f} m, outside travel [{low}, {high}] m"
-        )
-    return np.array([s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        write_session(self, path)

@@ -13,7 +13,7 @@ from diagrams.resection.operate import operate
 from diagrams.studies import load_scenario
 from plants.tissue.execution import load_execution
 from systems.common.archive import beside
-from systems.resection.planning.session import load_session
+from systems.resection.planning.resumed import load_session
 from systems.resection.wires.online_player import Wait
 
 SMALL = ["spacing=0.001", "reach_effort=0.005", "automatic=false"]

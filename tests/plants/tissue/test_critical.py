@@ -10,7 +10,8 @@ from plants.tissue.critical import EXACT, Boxes, cover
 from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.tissue import Tissue
 from plants.tissue.volume import Access, make_volume
-from systems.resection.planning.session import Session, load_session
+from systems.resection.planning.resumed import load_session
+from systems.resection.planning.session import Session
 from tests.plants.tissue.mask_files import TURN
 
 OBLIQUE = TURN @ [0.3, -0.5, -1.0]

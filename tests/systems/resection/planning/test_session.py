@@ -29,7 +29,7 @@ from systems.resection.planning.procedure import (
     save_procedures,
 )
 from systems.resection.planning.reach import find_reach
-from systems.resection.planning.session import load_session
+from systems.resection.planning.resumed import load_session
 from tests.ball import ball_session, ball_tissue
 
 ENTRY = Procedure("entry", length=0.016, radius=0.005, pitch=1e-3, name="entry")
