@@ -384,6 +384,14 @@ PAPERS: dict[str, list[Row]] = {
             FAITHFUL,
         ),
         Row(
+            "V.B: procedures chosen off line, possibly on line",
+            "diagrams/resection/online.py",
+            "tests/diagrams/resection/test_online.py::"
+            "test_chosen_ahead_of_need_it_is_the_plan_to_the_last_digit",
+            "",
+            FAITHFUL,
+        ),
+        Row(
             "V.B.3, Figure 8: an entry and two procedures with axes of their own",
             "diagrams/resection/scenarios/resect_paper.yaml",
             f"{OPERATED}::test_two_procedures_of_figure_8_have_axes_of_their_own",
