@@ -223,17 +223,27 @@ def resect_command(arguments: argparse.Namespace) -> int:
 
 def execute(arguments: argparse.Namespace, scenario: Any, file: Path) -> int:
     """Runs `trocar resect --execute`."""
-    from diagrams.common.figures import table
-    from diagrams.resection.operate import operate
+    import webbrowser
 
-    if arguments.browser:
-        raise ScenarioError("--execute: lines only; expected no --browser with it")
+    from diagrams.common.figures import table
+    from diagrams.resection.operate import listened, operate, operate_by_page
+
     if not 0.0 < arguments.speed <= 100.0:
         raise ScenarioError(f"--speed {arguments.speed}: expected > 0 and <= 100")
-    by_hand = sys.stdin.isatty()
     out = arguments.out or Path("out") / default_name(arguments.name)
-    print(f"session {file}; `help` lists the commands")
-    run = operate(scenario, file, sys.stdin, out, arguments.speed if by_hand else 0.0)
+    if arguments.browser:
+
+        def opened(address: str) -> None:
+            print(f"{address}  (Ctrl-C ends it; what was done is saved)", flush=True)
+            webbrowser.open(address)
+
+        run = operate_by_page(
+            scenario, file, out, arguments.speed, arguments.host, opened
+        )
+    else:
+        print(f"session {file}; `help` lists the commands")
+        speed = arguments.speed if sys.stdin.isatty() else 0.0
+        run = operate(scenario, file, out, listened(sys.stdin, speed))
     if run.metrics:
         print(table(run.metrics))
     print(f"\n{out}/: trocar replay {out}, trocar run {out / 'scenario.yaml'}")

@@ -93,12 +93,12 @@ class OnlineConsole(Console):
 
     def _do(self, words: list[str]) -> str:
         command = words[0]
-        if self.is_over:
-            raise ValueError("it was said that no more will be chosen")
-        steps = self.session.steps
         if command in ("stop", "go") and len(words) == 1:
             self.is_stopped = command == "stop"
             return "no further step is begun" if self.is_stopped else "it goes on"
+        if self.is_over:
+            raise ValueError("it was said that no more will be chosen")
+        steps = self.session.steps
         if command in ("home", "end") and len(words) == 1:
             self.is_over = command == "end"
             if steps and steps[-1].kind != "home" and not self.is_stopped:

@@ -7,24 +7,49 @@ the same again.
 """
 
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Thread
-from time import perf_counter, sleep
+from time import monotonic, perf_counter, sleep
 from typing import Any
 
 import yaml
 
 from diagrams.common.progress import progress_bar
+from diagrams.common.replay import start_meshcat
 from diagrams.common.run import Run, prepare, run_scenario
+from diagrams.resection.browser import serve
+from diagrams.resection.desk import Desk
 from diagrams.resection.online import save_choices
+from diagrams.resection.operation import Operation
 from diagrams.resection.scenario import ResectionScenario
 from systems.common.archive import beside, whole
 from systems.resection.wires.online_player import Wait
 
 LATE = 0.05
 """By which the robot may lag behind the clock and catch up, in s."""
+
+
+class Pace:
+    """Keeps the robot to the clock on the wall."""
+
+    def __init__(self, speed: float) -> None:
+        """Makes a pace of so many simulated seconds a second; 0 for no pace."""
+        self._speed, self._begin, self._last = speed, 0.0, -1.0
+
+    def early(self, time: float) -> float:
+        """How much too early a simulated time in s is, in s of the clock."""
+        if self._speed == 0.0:
+            return 0.0
+        now = perf_counter()
+        if time < self._last or self._last < 0.0:  # it begins, perhaps again
+            self._begin = now - time / self._speed
+        late = now - (self._begin + time / self._speed)
+        self._begin += max(late - LATE, 0.0)
+        self._last = time
+        return max(-late, 0.0)
 
 
 class Listener:
@@ -38,7 +63,7 @@ class Listener:
             speed: Simulated seconds a second; 0 to hear all at once, and not to wait.
         """
         self._heard: SimpleQueue[str] = SimpleQueue()
-        self._speed, self._begin, self._last = speed, 0.0, -1.0
+        self._pace = Pace(speed)
         self._listens = Thread(target=self._listen, args=(lines,), daemon=True)
         self._listens.start()
         if speed == 0.0:
@@ -53,27 +78,64 @@ class Listener:
                 self._heard.put(line.strip())
         self._heard.put("end")
 
-    def hear(self, time: float) -> list[str]:
+    def hear(self, time: float, taken: int) -> list[str]:
         """Waits until it is time, and returns what has been said."""
-        if self._speed > 0.0:
-            now = perf_counter()
-            if time < self._last or self._last < 0.0:  # it begins, perhaps again
-                self._begin = now - time / self._speed
-            late = now - (self._begin + time / self._speed)
-            if late < 0.0:
-                sleep(-late)
-            self._begin += max(late - LATE, 0.0)
-            self._last = time
+        sleep(self._pace.early(time))
         return [self._heard.get() for _ in range(self._heard.qsize())]
+
+
+class OnlineDesk(Desk):
+    """A desk whose plan is carried out; it works while the robot's clock waits."""
+
+    def __init__(self, case: Operation, file: Path, meshcat: Any, speed: float) -> None:
+        """Draws a case's session, and is heard by its robot from now on."""
+        self._book, self._choosing = case.choosing.book, case.choosing
+        self._time, self._taken, self._due = 0.0, 0, -1.0
+        self._pace = Pace(speed)
+        super().__init__(case.scenario, file, meshcat, self._choosing.console)
+        self._book.hear, self._choosing.heed = self._hear, self._heed
+        self._words = words(Wait.PLAYING)
+
+    def _hear(self, time: float, taken: int) -> list[str]:
+        """Does what the page wants until it is time; all is answered at once."""
+        self._time, self._taken = time, taken
+        steps = self.console.session.steps
+        names = [step.name for step in steps if step.first <= taken < step.last]
+        self.show["robot"] = f"{time:.0f} s: {', '.join([self._words, *names])}"
+        self.turn(0.0)
+        while (early := self._pace.early(time)) > 0.0:
+            self.turn(early)
+        if monotonic() > self._due:
+            self._due = monotonic() + 0.5
+            self._publish()
+        return []
+
+    def _heed(self, time: float, reason: int) -> None:
+        self._words = words(reason)
+
+    def want(self, what: str, told: Any) -> None:
+        """As a desk's; what stops is the robot, after the present step."""
+        super().want(*(("line", "stop") if what == "stop" else (what, told)))
+
+    def _obey(self, line: str) -> None:
+        line = "end" if line.strip() in ("quit", "exit") else line
+        if self._proposed is not None and line.strip() != "map":
+            self._said(self._proposed[0])
+        super()._obey(line)
+
+    def _said(self, line: str) -> str:
+        """Has a line answered at this instant."""
+        self._book.say(self._time, line)
+        self._book.read(len(self._book.lines), self._taken, self._time)
+        answer: str = self._choosing.told[-1][2]
+        return answer
 
 
 def operate(
     scenario: ResectionScenario,
     file: Path,
-    lines: Iterable[str],
     out: Path,
-    speed: float = 1.0,
-    tell: Callable[[str], Any] = print,
+    begin: Callable[[Operation], Any],
     with_replay: bool = True,
 ) -> Run:
     """Carries out what is chosen meanwhile.
@@ -81,10 +143,8 @@ def operate(
     Args:
         scenario: Of the resection.
         file: The session's; if it is there, with its execution, it goes on.
-        lines: Of the console.
         out: Folder of the results.
-        speed: Simulated seconds a second; 0 for as fast as it goes, all lines at once.
-        tell: Is told what is answered, and why the robot waits.
+        begin: Sees to it that somebody chooses: `listened`, or a desk.
         with_replay: Whether a replay is drawn.
 
     Raises:
@@ -93,11 +153,9 @@ def operate(
     file.parent.mkdir(parents=True, exist_ok=True)
     case: Any = prepare(replace(scenario, session=str(file), choices=""), progress_bar)
     choosing, kept = case.choosing, beside(file, "choices.csv")
-    choosing.hear = lambda line, answer: tell(f"> {line}\n{answer}".rstrip())
-    choosing.heed = lambda time, reason: tell(f"{time:.1f} s: {words(reason)}")
-    choosing.book.hear = Listener(lines, speed).hear
     save_choices(kept, [])
     case.scenario.choices = str(kept)  # copied with the results
+    begin(case)
     try:
         return run_scenario(case, out, with_replay)
     finally:
@@ -106,6 +164,57 @@ def operate(
             save_choices(out / "inputs" / kept.name, choosing.lines)
             if choosing.is_whole:
                 _begin_anew(out / "scenario.yaml")
+
+
+def listened(
+    lines: Iterable[str], speed: float = 1.0, tell: Callable[[str], Any] = print
+) -> Callable[[Operation], None]:
+    """Has somebody's lines heard, and tells what is answered and why it waits.
+
+    Args:
+        lines: Of the console.
+        speed: Simulated seconds a second; 0 for as fast as it goes, all lines at once.
+        tell: Is told the answers.
+    """
+
+    def begin(case: Operation) -> None:
+        choosing = case.choosing
+        choosing.hear = lambda line, answer: tell(f"> {line}\n{answer}".rstrip())
+        choosing.heed = lambda time, reason: tell(f"{time:.1f} s: {words(reason)}")
+        choosing.book.hear = Listener(lines, speed).hear
+
+    return begin
+
+
+def operate_by_page(
+    scenario: ResectionScenario,
+    file: Path,
+    out: Path,
+    speed: float = 1.0,
+    host: str = "localhost",
+    opened: Callable[[str], Any] = print,
+) -> Run:
+    """As `operate`, chosen on a page of the browser.
+
+    Args:
+        scenario: Of the resection.
+        file: The session's.
+        out: Folder of the results.
+        speed: Simulated seconds a second.
+        host: Where to listen.
+        opened: Called with the page's address.
+    """
+    with ExitStack() as stack:
+
+        def begin(case: Operation) -> None:
+            desk = OnlineDesk(case, file, start_meshcat(host), speed)
+            server, address = serve(desk, host)
+            stack.callback(server.server_close)
+            stack.callback(server.shutdown)
+            stack.callback(desk.close)
+            opened(address)
+
+        return operate(scenario, file, out, begin)
 
 
 def words(reason: int) -> str:

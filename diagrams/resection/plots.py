@@ -42,6 +42,8 @@ def _mesh(axes: Any, mask: np.ndarray, volume: Any, color: str, alpha: float) ->
     if not small.any():
         return
     vertices, faces = surface(small, volume.origin, every * volume.spacing)
+    if len(faces) == 0:
+        return  # too little to be seen
     axes.plot_trisurf(
         *(MM * vertices.T), triangles=faces, color=color, alpha=alpha, lw=0, shade=True
     )

@@ -27,7 +27,8 @@ class Book:
     Attributes:
         pages: The plan before any line, and after each that was answered.
         lines: When, in s, and what.
-        hear: What somebody says at a time in s, asked at every instant.
+        hear: What somebody says, asked at every instant: its time in s, and the last
+            posture taken. Whoever has it answered at once says nothing here.
         heed: Told at every instant the time, and why the robot waits, a `Wait`.
     """
 
@@ -47,14 +48,12 @@ class Book:
         """
         self.pages = [first]
         self.lines = list(lines)
-        self.hear: Callable[[float], Iterable[str]] = lambda time: ()
+        self.hear: Callable[[float, int], Iterable[str]] = lambda time, taken: ()
         self.heed: Callable[[float, int], None] = lambda time, reason: None
         self._answer = answer
 
     def due(self, time: float) -> int:
-        """How many lines are due by a time in s, those heard just now among them."""
-        for line in self.hear(time):
-            self.say(time, line)
+        """How many lines are due by a time in s."""
         return bisect_right(self.lines, time + TIGHT, key=lambda line: line[0])
 
     def say(self, time: float, line: str) -> None:
@@ -113,6 +112,8 @@ class ProcedureChooser(Block):
         if self._waiting.HasValue(context):
             (reason,) = self._waiting.Eval(context).tolist()
             book.heed(time, int(reason) if np.isfinite(reason) else 0)
+        for line in book.hear(time, last):
+            book.say(time, line)
         number = book.read(max(book.due(time), int(page)), last, time)
         plan = book.pages[number]
         idle = plan.after(last) is None and not plan.is_over and not plan.is_stopped

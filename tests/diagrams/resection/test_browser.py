@@ -14,8 +14,9 @@ from PIL import Image as Picture
 import pytest
 
 from diagrams.common.replay import start_meshcat
-from diagrams.resection.browser import Desk, run_browser, serve
+from diagrams.resection.browser import run_browser, serve
 from diagrams.resection.console import Console, open_session
+from diagrams.resection.desk import Desk
 from diagrams.resection.form import Form, form_of
 from diagrams.studies import load_scenario
 from systems.resection.planning.feasibility_map import feasibility_map, growing_map

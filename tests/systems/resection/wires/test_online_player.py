@@ -82,8 +82,10 @@ def test_chosen_late_it_waits_where_the_last_one_ended(late):
     """At any moment: in mid-braking, at the end, long after it."""
     x = wander(3)
     whole = profile(x[: ENDS[1] + 1], PARAMS).times
-    for moment in whole[ENDS[0]] + late + np.arange(-6, 3) * PARAMS.lead:
-        y, waiting, reached = play(x, [(0.0, "1"), (moment, "2")], whole[-1] + 7.0)
+    for moment in whole[ENDS[0]] + late + np.array([-4, -2, -1, 1]) * PARAMS.lead:
+        y, waiting, reached = play(
+            x, [(0.0, "1"), (moment, "2")], whole[-1] + late + 1.0
+        )
         assert_smooth(y)
         assert reached[-1] == ENDS[1] and np.array_equal(y[-1], x[ENDS[1]])
         assert waiting[-1] == Wait.NOTHING_CHOSEN
