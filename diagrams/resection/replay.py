@@ -3,11 +3,12 @@
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import Rgba
+from pydrake.geometry import Rgba, Sphere
 from pydrake.math import RigidTransform
 
 from diagrams.resection.metrics import carving_of, times_of
 from plants.snake.last_module import meridian
+from plants.snake.looks import SWEPT
 from plants.tissue.labels import CAP, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
 from plants.tissue.surface import surface
@@ -88,12 +89,41 @@ def decorate(meshcat: Any, animation: Any, run: Any) -> None:
     tissue = np.isin(volume.labels, (TUMOUR, CAP))
     draw_tissue(meshcat, animation, run, run.case.done.index)
     _elementary_volumes(meshcat, animation, run)
+    _tools(meshcat, animation, run)
     # The study's view shows 6 cm; a smaller tumour is looked at from nearer.
     view = run.study.view
     nearer = min(1.0, float(np.ptp(volume.points(tissue), axis=0).max()) / 0.055)
     target = nearer * np.array(view.target)
     away = np.array(view.camera) - np.array(view.target)
     meshcat.SetCameraPose(target + nearer * away, target)
+
+
+def _tools(meshcat: Any, animation: Any, run: Any) -> None:
+    """Shows the ball that the robot carries: the plant has its first one throughout."""
+    session = run.case.session
+    if not session.tools:
+        return
+    station = run.diagram.GetSubsystemByName("station")
+    plant = station.GetSubsystemByName("plant")
+    inspector = station.GetSubsystemByName("scene_graph").model_inspector()
+    body = plant.GetBodyByName("tool")
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    names = [inspector.GetName(drawn) for drawn in inspector.GetGeometries(frame)]
+    place = f"scene/{inspector.GetName(frame)}".replace("::", "/")
+    own = [f"{place}/{n.replace('::', '/')}" for n in names if "shank" not in n]
+    paths = {session.own.tool_radius: own}
+    for tool in session.tools:
+        if tool.radius not in paths:
+            paths[tool.radius] = [f"{place}/ball{len(paths)}"]
+            meshcat.SetObject(*paths[tool.radius], Sphere(tool.radius), Rgba(*SWEPT))
+    times = times_of(run) / run.replay_speed
+    changes = [0.0, *(times[tool.time] for tool in session.tools)]
+    radii = [session.own.tool_radius, *(tool.radius for tool in session.tools)]
+    for start, carried in zip(changes, radii, strict=True):
+        for radius, parts in paths.items():
+            for part in parts:
+                shown = radius == carried
+                animation.SetProperty(animation.frame(start), part, "visible", shown)
 
 
 def _turn_to_entries(

@@ -6,16 +6,21 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from diagrams.common.cli import main
+from diagrams.common.replay import start_meshcat
 from diagrams.common.run import prepare, run_scenario, simulate
 from diagrams.common.scenario import ScenarioError
+from diagrams.resection import replay
+from diagrams.resection.metrics import times_of
 from diagrams.studies import build, load_scenario
 from plants.tissue.execution import Execution, load_execution, save_execution
 from systems.common.archive import beside
+from systems.resection.planning.procedure import Procedure
 from systems.resection.planning.reach import load_reach, save_reach
 from tests import runs
 
@@ -165,6 +170,33 @@ def test_auto_small(overrides):
     assert m["healthy_removed"] <= 0.01 * m["tumour_volume"]
     assert m["max_outside_depth"] <= 1e-3
     assert m["body_collisions"] == 0
+
+
+def test_the_replay_shows_the_ball_that_is_carried():
+    tiny = ["spacing=0.002", "tumour.length=0.024", "automatic=false"]
+    tiny += ["reach_effort=0.005", "balls.time=1.0"]
+    case = prepare(load_scenario("resect_auto_small", tiny))
+    case.session.commit(Procedure("entry", length=0.002, radius=0.0055, clipped=True))
+    case.session.change_tool(0.003)
+    meshcat = start_meshcat()
+    run = simulate(case, meshcat)
+    assert not run.error and run.simulated > case.scenario.balls.time
+    times = times_of(run) / run.replay_speed
+    change = times[case.session.tools[0].time]
+    told: list[tuple] = []
+    stand_in = SimpleNamespace(
+        frame=lambda time: time, SetProperty=lambda *said: told.append(said)
+    )
+    scene = SimpleNamespace(SetObject=lambda path, shape, rgba: told.append(path))
+    replay._tools(scene, stand_in, run)
+    ball, *shown = told
+    assert ball == "scene/snake/tool/ball1"
+    assert (0.0, ball, "visible", False) in shown
+    assert (change, ball, "visible", True) in shown
+    first = {path for _, path, _, on in shown if path != ball}
+    assert len(first) == 21  # the ball that the ring sweeps, and the ring's pieces
+    assert all((change, path, "visible", False) in shown for path in first)
+    assert all(meshcat.HasPath(path) for path in [ball, *first])
 
 
 @pytest.mark.study
