@@ -133,8 +133,8 @@ def add_bedside(
 def stiffen(case: Any, station: Any, context: Any) -> None:
     """Sets the trocar's stiffness for the present time: insufflation stretches it.
 
-    The spring's constants are parameters of the plant, which no block may change,
-    so this is done between two advances.
+    The spring's constants are parameters of the plant, which no block may change, so
+    this is done between two advances. Grain and memory of its tissue stay as they are.
 
     Args:
         case: Its scenario has `abdomen` and `wall_motion`.
@@ -147,7 +147,8 @@ def stiffen(case: Any, station: Any, context: Any) -> None:
     plant = station.GetSubsystemByName("plant")
     for index in range(plant.num_force_elements()):
         element = plant.get_force_element(ForceElementIndex(index))
-        if isinstance(element, LinearBushingRollPitchYaw):
+        spring = isinstance(element, LinearBushingRollPitchYaw)
+        if spring and element.frameA().name() == "fulcrum":
             stiffness = case.scenario.abdomen.stiffness * motion.stiffness_factor(
                 context.get_time()
             )
