@@ -19,6 +19,7 @@ from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
 from plants.instruments.tip_push import TipPushParams, add_tip_push
+from plants.instruments.tool_shaft import add_tool_shaft
 from plants.instruments.tube import TubeParams, add_tube
 from systems.common.parameter import parameter
 
@@ -90,7 +91,7 @@ def add_bedside(
     instrument = add(plant, plant.GetFrameByName("flange", arm), hung)
     abdomen = add_abdomen(
         plant,
-        instrument.body.body_frame(),
+        instrument.shaft.body_frame(),
         scenario.robot.p_WG,
         scenario.abdomen,
         bore=bore,
@@ -102,7 +103,8 @@ def add_bedside(
     moved = motion.displacement(0.0)
     p_WG = np.add(scenario.robot.p_WG, moved)
     known = plant
-    if plant.num_constraints():  # couplers would be constraints to the solver as well
+    # Couplers would be constraints to the solver as well, and a bend a freedom.
+    if plant.num_constraints() or hung.bending_stiffness:
         known = make_controller_plant(instrument=scenario.instrument)
     posture = home_posture(
         known,
@@ -125,6 +127,8 @@ def add_bedside(
         "scene_graph": scene_graph,
         "wall_force": add_wall_force(builder, plant, abdomen, motion.stiffness_factor),
     }
+    if hung.bending_stiffness:
+        systems["tool_shaft"] = add_tool_shaft(builder, plant, instrument)
     if push:
         systems["tip_push"] = push
     return Bedside(systems, posture, instrument, abdomen, below)
