@@ -19,6 +19,7 @@ from plants.common.actuation import hold_still
 from plants.common.scene import add_plant_and_scene, connect_poses
 from plants.instruments.instrument import Instrument, add_instrument
 from plants.instruments.tip_push import TipPushParams, add_tip_push
+from plants.instruments.tool_shaft import add_tool_shaft
 from plants.instruments.tube import TubeParams, add_tube
 from systems.common.parameter import parameter
 
@@ -90,7 +91,7 @@ def add_bedside(
     instrument = add(plant, plant.GetFrameByName("flange", arm), hung)
     abdomen = add_abdomen(
         plant,
-        instrument.body.body_frame(),
+        instrument.shaft.body_frame(),
         scenario.robot.p_WG,
         scenario.abdomen,
         bore=bore,
@@ -102,7 +103,8 @@ def add_bedside(
     moved = motion.displacement(0.0)
     p_WG = np.add(scenario.robot.p_WG, moved)
     known = plant
-    if plant.num_constraints():  # couplers would be constraints to the solver as well
+    # Couplers would be constraints to the solver as well, and a bend a freedom.
+    if plant.num_constraints() or hung.bending_stiffness:
         known = make_controller_plant(instrument=scenario.instrument)
     posture = home_posture(
         known,
@@ -125,6 +127,8 @@ def add_bedside(
         "scene_graph": scene_graph,
         "wall_force": add_wall_force(builder, plant, abdomen, motion.stiffness_factor),
     }
+    if hung.bending_stiffness:
+        systems["tool_shaft"] = add_tool_shaft(builder, plant, instrument)
     if push:
         systems["tip_push"] = push
     return Bedside(systems, posture, instrument, abdomen, below)
@@ -133,8 +137,8 @@ def add_bedside(
 def stiffen(case: Any, station: Any, context: Any) -> None:
     """Sets the trocar's stiffness for the present time: insufflation stretches it.
 
-    The spring's constants are parameters of the plant, which no block may change,
-    so this is done between two advances.
+    The spring's constants are parameters of the plant, which no block may change, so
+    this is done between two advances. Grain and memory of its tissue stay as they are.
 
     Args:
         case: Its scenario has `abdomen` and `wall_motion`.
@@ -147,7 +151,8 @@ def stiffen(case: Any, station: Any, context: Any) -> None:
     plant = station.GetSubsystemByName("plant")
     for index in range(plant.num_force_elements()):
         element = plant.get_force_element(ForceElementIndex(index))
-        if isinstance(element, LinearBushingRollPitchYaw):
+        spring = isinstance(element, LinearBushingRollPitchYaw)
+        if spring and element.frameA().name() == "fulcrum":
             stiffness = case.scenario.abdomen.stiffness * motion.stiffness_factor(
                 context.get_time()
             )

@@ -15,9 +15,11 @@ from systems.common.signals import (
     MovingPoint,
     Permission,
     Point,
+    Shaft,
     ShaftMotion,
     Wrench,
 )
+from systems.motion.straight_tool import StraightTool
 from systems.passive_wrist.fulcrum_estimator import Covariance, FulcrumEstimator
 from systems.passive_wrist.fulcrum_filter import FulcrumParams
 from systems.passive_wrist.navigation_monitor import (
@@ -28,6 +30,7 @@ from systems.passive_wrist.navigation_monitor import (
 from systems.passive_wrist.passive_wrist_emulation import PassiveWristEmulation
 from systems.passive_wrist.tip_load import TipForce, TipLoad, TipLoadParams
 from systems.passive_wrist.wrist_law import MODES, WristParams
+from systems.sensing.shaft_bend import ShaftBend, ShaftBendParams
 from systems.sensing.tool_wrench import (
     ToolWrenchParams,
     add_tool_wrench,
@@ -62,6 +65,29 @@ TIP_WIRES = (
 """What takes the place of the wire to the watch where tip and wall are told apart."""
 
 
+BENT = {
+    "tool_wrench.shaft": "shaft_bend.bent_shaft",
+    "tool_wrench.wrench": "shaft_bend.bent_wrench",
+}
+"""What takes the place of the sensor where the shaft's bend is reckoned."""
+BEND_WIRES = (
+    ("tool_wrench.shaft", "shaft_bend.shaft"),
+    ("tool_wrench.wrench", "shaft_bend.wrench"),
+    ("shaft_bend.bend", "robot_location.bend"),
+    ("shaft_bend.bend", "straight_tool.bend"),
+    ("straight_tool.tool", "joint_commands.tool"),
+)
+
+
+def unbent(scenario: Any, wires: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    """The wires with the shaft's bend reckoned, if it is."""
+    if not scenario.shaft_bend.active:
+        return [*wires]
+    through = {"joint_commands.tool": "straight_tool.wanted"}
+    led = [(BENT.get(a, a), through.get(b, b)) for a, b in wires]
+    return [*led, *BEND_WIRES]
+
+
 def wrist_wires(scenario: Any) -> list[tuple[str, str]]:
     """The wires of sensor, estimator and emulation; `tool_wanted` is left."""
     if not scenario.tip_load.active:
@@ -72,12 +98,16 @@ def wrist_wires(scenario: Any) -> list[tuple[str, str]]:
 
 def wrist_exports(scenario: Any) -> dict[str, str]:
     """What can be logged of it."""
-    return WRIST_EXPORTS | (TIP_EXPORTS if scenario.tip_load.active else {})
+    exports = WRIST_EXPORTS | (TIP_EXPORTS if scenario.tip_load.active else {})
+    bends = scenario.instrument.bending_stiffness
+    return exports | (BEND_EXPORTS if bends else {})
 
 
 def wrist_signals(scenario: Any) -> dict[str, Any]:
     """What is logged of it."""
-    return WRIST_SIGNALS | (TIP_SIGNALS if scenario.tip_load.active else {})
+    signals = WRIST_SIGNALS | (TIP_SIGNALS if scenario.tip_load.active else {})
+    bends = scenario.instrument.bending_stiffness
+    return signals | (BEND_SIGNALS if bends else {})
 
 
 WRIST_EXPORTS = {
@@ -108,14 +138,18 @@ WRIST_SIGNALS = {
 TIP_EXPORTS = {"wrist.tip_force": "tip_load.tip_force"}
 TIP_SIGNALS = {"wrist.tip_force": TipForce}
 """The same where tip and wall are told apart."""
+BEND_EXPORTS = {"robot.shaft": "tool_shaft.shaft"}
+BEND_SIGNALS = {"robot.shaft": Shaft}
+"""The same where the shaft bends: the true one."""
 
 
 @dataclass
 class TipSettings:
-    """What a scenario says of the tip's load."""
+    """What a scenario says of the tip's load, and of the shaft's bend."""
 
     tip_load: TipLoadParams = part(TipLoadParams)
     tip_push: TipPushParams = part(TipPushParams)
+    shaft_bend: ShaftBendParams = part(ShaftBendParams)
 
 
 @dataclass
@@ -178,11 +212,13 @@ def add_wrist(
         p + e for p, e in zip(scenario.robot.p_WG, scenario.first_guess, strict=True)
     ]
     sensor = replace(scenario.tool_wrench, seed=scenario.seed)
+    bend = getattr(scenario, "shaft_bend", ShaftBendParams())
+    late = sensor.delay * sensor.period if sensor.aligned else 0.0
     estimator = replace(
         scenario.fulcrum_estimator,
         guess=guess,
         length=scenario.instrument.length,
-        latency=sensor.delay * sensor.period if sensor.aligned else 0.0,
+        latency=late + (bend.smooth if bend.active else 0.0),
     )
     wrist = replace(scenario.passive_wrist, mode=scenario.wrist, guess=guess)
     systems = {
@@ -212,6 +248,12 @@ def add_wrist(
         told = replace(tip, length=scenario.instrument.length, period=sensor.period)
         systems["tip_load"] = TipLoad(told, guess)
         new.append("tip_load")
+    if bend.active:
+        told_tool = told_instrument(sensor, scenario.instrument)
+        reckoned = replace(bend, period=sensor.period)
+        systems["shaft_bend"] = ShaftBend(reckoned, told_tool)
+        systems["straight_tool"] = StraightTool()
+        new += ["shaft_bend", "straight_tool"]
     for name in new:
         builder.AddNamedSystem(name, systems[name])
     return systems

@@ -82,12 +82,31 @@ def wrist_figures(run: Any, start: float, event: float = -1.0) -> dict[str, Any]
     }
     if "wrist.tip_force" in run.logged:
         figures["rms_tip_force_error"] = tip_force_error(run)
+    if "robot.shaft" in run.logged:
+        figures |= bend_figures(run, late)
     if event >= 0.0:
         after = time >= event
         clock, load = time[after] - event, force[after]
         figures["time_to_2N"] = last_above(clock, load, 2.0)
         figures["time_to_02N"] = last_above(clock, load, 0.2)
     return figures
+
+
+def true_tip(run: Any) -> np.ndarray:
+    """Of the robot's tool, (n, 3): as the joints have it, if the shaft is rigid."""
+    tip: np.ndarray = (
+        run.robot.shaft.tip if "robot.shaft" in run.logged else run.robot.tool.tip
+    )
+    return tip
+
+
+def bend_figures(run: Any, late: np.ndarray) -> dict[str, Any]:
+    """How far the bend carries the tip, and how much of it is not reckoned."""
+    shaft, true = run.wrist.shaft, run.robot.shaft.tip
+    straight = shaft.p + run.scenario.instrument.length * shaft.u
+    way = np.linalg.norm(true - straight, axis=1)[late]
+    left = np.linalg.norm(true - run.robot.tool.tip, axis=1)[late]
+    return {"rms_bend": rms(way), "max_bend": most(way), "rms_bend_error": rms(left)}
 
 
 def tip_force_error(run: Any) -> float | None:

@@ -12,7 +12,7 @@ from pydrake.systems.primitives import (
     RandomSource,
 )
 
-from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
+from diagrams.bedside.wrist import add_wrist, unbent, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
 from diagrams.gauze import organs as inside
 from diagrams.gauze.scenario import GauzeScenario
@@ -263,7 +263,7 @@ def make_blocks(
         "endoscope": CameraPlanner(s.camera_planner, s.camera, obstacles, organs)
         if s.camera_planner.active
         else Endoscope(s.camera),
-        "robot_location": RobotLocation(s.instrument),
+        "robot_location": RobotLocation(s.instrument, s.shaft_bend.active),
         "go_to_target": ToolBypass(s.tool_bypass, *around, obstacles, organs)
         if s.behaviour == "bypass"
         else GoToTarget(s.go_to_target, obstacles),
@@ -341,6 +341,7 @@ def wiring(
         ahead = ("endoscope.view_cone", "go_to_target.view_cone")
     wires += [w for w in (*EXTRA_WIRES, ahead) if has_input(systems, w[1])]
     exports |= {k: v for k, v in EXTRA_EXPORTS.items() if has_output(systems, v)}
+    wires = unbent(scenario, wires)
     known = aliases(scenario)
     return [(known.get(source, source), sink) for source, sink in wires], exports
 

@@ -4,7 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.bedside.wrist_metrics import AFTER, most, rms, wrist_figures
+from diagrams.bedside.wrist_metrics import (
+    AFTER,
+    most,
+    rms,
+    true_tip,
+    wrist_figures,
+)
 from diagrams.gauze.bypass_metrics import bypass_figures
 from diagrams.gauze.foresight import Reach, unavoidable
 from diagrams.gauze.organs import organ_figures
@@ -82,7 +88,7 @@ def tool_lines(run: Any) -> tuple[np.ndarray, np.ndarray]:
 def gauze_clearance(run: Any) -> float:
     """Least distance of the gauze's surface at R's tip from an obstacle's [m]."""
     tips, ends = tool_lines(run)
-    ways = zip(run.robot.tool.tip, tips, ends, strict=True)
+    ways = zip(true_tip(run), tips, ends, strict=True)
     least = min(
         closest_on_segment(vector(p), vector(a), vector(b))[1]
         for p, each, inner in ways
@@ -122,7 +128,7 @@ def registration_error(run: Any) -> float:
 def measure(run: Any) -> dict[str, Any]:
     """The figures of a run, as `metrics.json` keeps them."""
     time = run.signals["time"]
-    tip = run.robot.tool.tip
+    tip = true_tip(run)
     tip_error = np.linalg.norm(tip - logged(run, run.scenario.target).shaft.tip, axis=1)
     force = np.linalg.norm(run.wall.force.f, axis=1)
     arrival = time_to_target(time, tip_error)

@@ -40,7 +40,7 @@ def add_organs(
     """Adds what moves, shows and yields; returns the systems by name."""
     plant, scene_graph = theatre.systems["plant"], theatre.systems["scene_graph"]
     shaft = theatre.instrument.shaft_geometry
-    body = int(theatre.instrument.body.index())
+    body = int(theatre.instrument.shaft.index())
     robot = capsule_of(scene_graph.model_inspector(), shaft, body)
     touch = OrganTouch(organs, scenario.organs, robot, scenario.organ_touch)
     posed = PosedOrgans(scene_graph, scenario.organs)

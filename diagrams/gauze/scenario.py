@@ -202,6 +202,10 @@ def organ_rules(scenario: GauzeScenario) -> Rules:
     alone = not (press and scenario.tip_load.active)
     told = "False with press.active, which tells what touches the tip itself"
     yield alone, "tip_load.active", told
+    felt = scenario.emulated or not scenario.instrument.bending_stiffness
+    yield felt, "wrist", "'pwe' with instrument.bending_stiffness: it feels the bend"
+    bends = scenario.emulated or not scenario.shaft_bend.active
+    yield bends, "shaft_bend.active", "False without the wrist's sensor: wrist=known"
 
 
 def tool_rules(scenario: GauzeScenario) -> Rules:

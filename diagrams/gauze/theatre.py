@@ -22,7 +22,7 @@ def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> 
     """
     bedside = bedside or add_bedside(builder, scenario)
     plant, scene_graph = bedside.systems["plant"], bedside.systems["scene_graph"]
-    if scenario.registration.active:
+    if scenario.registration.active and "tool_shaft" not in bedside.systems:
         bedside.systems["tool_shaft"] = add_tool_shaft(
             builder, plant, bedside.instrument
         )

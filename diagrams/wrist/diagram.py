@@ -6,7 +6,7 @@ from typing import Any
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.bedside.bedside import add_bedside
-from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
+from diagrams.bedside.wrist import add_wrist, unbent, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.wrist.scenario import WristScenario
 from systems.common.outside import Outside
@@ -77,7 +77,9 @@ def make_wrist_diagram(
                 scenario.arm,
                 told_instrument(scenario.tool_wrench, scenario.instrument),
             ),
-            "robot_location": RobotLocation(scenario.instrument),
+            "robot_location": RobotLocation(
+                scenario.instrument, scenario.shaft_bend.active
+            ),
         },
         swaps,
     )
@@ -86,7 +88,7 @@ def make_wrist_diagram(
         builder,
         "passive_wrist",
         systems,
-        [*WIRES, *wrist_wires(scenario), *([LED] if is_led else [])],
+        unbent(scenario, [*WIRES, *wrist_wires(scenario), *([LED] if is_led else [])]),
         EXPORTS | wrist_exports(scenario),
         scenario.faults,
     )

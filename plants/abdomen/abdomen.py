@@ -10,6 +10,7 @@ and, where the trocar resists tilting, a torque -k phi, phi from the wall's norm
 what the wall does to the shaft, p_c being the shaft's point nearest the fulcrum
 I. Along the shaft there is only the seal's friction, 0.25 to 3 N in the literature,
 most of it dry. Lateral trocar stiffness was not found in vivo: sweep 100 to 3000 N/m.
+What the tissue has beside the spring, a grain and a memory, stands in `tissue`.
 """
 
 from collections.abc import Sequence
@@ -29,10 +30,11 @@ from pydrake.multibody.tree import (
 )
 
 from plants.abdomen.skin import draw_skin
+from plants.abdomen.tissue import TissueParams, add_tissue
 from plants.common.looks import TROCAR, draw
 from systems.common.compiled import compiled
 from systems.common.geometry import Pose, Vector, along, cross, scaled
-from systems.common.parameter import check, parameter
+from systems.common.parameter import check, parameter, part
 
 TURNING_DAMPING = 0.02
 """Of a trocar's resistance to tilting, for its stiffness, in s."""
@@ -67,6 +69,7 @@ class AbdomenParams:
     wall_stiffness: float = parameter(
         2e5, "of the servos that place the wall", "N/m", least=1e3, most=1e6
     )
+    tissue: TissueParams = part(TissueParams)
 
 
 @dataclass
@@ -84,6 +87,7 @@ class Abdomen:
         sleeve: The sleeve's body, z along the shaft towards the tip.
         sleeve_joint: Its position is the distance from the sensor along the shaft.
         bushing: The spring, from the wall to the sleeve.
+        slow: The body of the tissue's branch that relaxes; None without one.
         params: What it was made from.
     """
 
@@ -93,6 +97,7 @@ class Abdomen:
     sleeve: Any
     sleeve_joint: PrismaticJoint
     bushing: LinearBushingRollPitchYaw
+    slow: Any
     params: AbdomenParams
 
 
@@ -169,9 +174,12 @@ def add_abdomen(
             [params.damping] * 3,
         )
     )
+    slow = add_tissue(plant, wall, sleeve, params.tissue)
     for instance in (wall_instance, sleeve_instance):
         plant.set_gravity_enabled(instance, False)
-    return Abdomen(wall_instance, sleeve_instance, wall, sleeve, joint, bushing, params)
+    return Abdomen(
+        wall_instance, sleeve_instance, wall, sleeve, joint, bushing, slow, params
+    )
 
 
 @compiled

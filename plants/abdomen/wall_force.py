@@ -9,9 +9,10 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from plants.abdomen.abdomen import Abdomen
+from plants.abdomen.tissue import tissue_on_sleeve, tissue_record
 from plants.common.tree import move_tree, pose_in, read_tree
 from systems.common.compiled import Numbers, compiled, packed
-from systems.common.geometry import across, along, norm, scaled, sub, xyz
+from systems.common.geometry import across, along, norm, plus, scaled, sub, xyz
 from systems.common.signal import Field, Vector
 from systems.common.signals import Force, MovingPoint
 from systems.common.step_block import StepBlock, wired
@@ -57,6 +58,9 @@ def _truth(
     force, away = lateral_force(
         sub(wall.p, sleeve.p), sleeve.z, v, stiffness[0], c.damping
     )
+    if c.grain_stiffness + c.slow_stiffness > 0.0:
+        _, pull = tissue_on_sleeve(c, X, wall.p, sleeve.p)
+        force = plus(force, across(pull, sleeve.z))
     return Force(force), FulcrumError(away), MovingPoint(wall.p, v_WI)
 
 
@@ -90,6 +94,7 @@ class WallForce(StepBlock):
             wall=int(abdomen.wall.index()),
             sleeve=int(abdomen.sleeve.index()),
             damping=float(abdomen.params.damping),
+            **tissue_record(abdomen.params.tissue, abdomen.slow),
         )
         self._tree = read_tree(plant)
         start = plant.GetPositionsAndVelocities(plant.CreateDefaultContext())

@@ -1,5 +1,6 @@
 """The arm and its instrument alone, as a controller knows them."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ def make_controller_plant(
 ) -> Any:
     """Makes a plant of seven positions for kinematics and gravity, without geometry.
 
+    Its instrument does not bend.
     Gravity acts on the instrument alone, so that
     `-CalcGravityGeneralizedForces(context)` is the torque that carries it.
 
@@ -32,7 +34,8 @@ def make_controller_plant(
     # integrators pass over joint limits.
     plant = MultibodyPlant(time_step=1e-3)
     arm = add_arm(plant, X_WB)
-    add_instrument(plant, plant.GetFrameByName("flange", arm), instrument)
+    rigid = replace(instrument or InstrumentParams(), bending_stiffness=0.0)
+    add_instrument(plant, plant.GetFrameByName("flange", arm), rigid)
     plant.Finalize()
     return plant
 

@@ -77,7 +77,7 @@ def add_tip_push(
         return None
     point = [0.0, 0.0, instrument.length]
     block: TipPush = builder.AddNamedSystem(
-        "tip_push", TipPush(params, instrument.body, point)
+        "tip_push", TipPush(params, instrument.shaft, point)
     )
     builder.Connect(
         block.get_output_port(), plant.get_applied_spatial_force_input_port()

@@ -35,7 +35,7 @@ class ToolShaft(Block):
 def add_tool_shaft(builder: Any, plant: Any, instrument: Any) -> ToolShaft:
     """Adds the block as `tool_shaft` and wires it to the plant."""
     block: ToolShaft = builder.AddNamedSystem(
-        "tool_shaft", ToolShaft(int(instrument.body.index()), instrument.length)
+        "tool_shaft", ToolShaft(int(instrument.shaft.index()), instrument.length)
     )
     builder.Connect(plant.GetOutputPort("body_poses"), block.GetInputPort("body_poses"))
     return block

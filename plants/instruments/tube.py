@@ -53,7 +53,7 @@ def add_tube(plant: Any, frame: Any, params: TubeParams) -> Instrument:
 def channel_frame(plant: Any, tube: Instrument, params: TubeParams) -> Any:
     """Adds the snake's channel frame C to a plant that is not yet finalized."""
     X_MC = RigidTransform([0.0, 0.0, params.length + params.gap])
-    body = tube.body.body_frame()
+    body = tube.shaft.body_frame()
     return plant.AddFrame(FixedOffsetFrame("channel", body, X_MC, tube.instance))
 
 

@@ -20,6 +20,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import ModelInstanceIndex
 
 from plants.abdomen.abdomen import Abdomen, spring_on_sleeve, turning_on_sleeve
+from plants.abdomen.tissue import tissue_on_sleeve, tissue_record
 from plants.common.tree import mass_centre, momentum, move_tree, pose_in, read_tree
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
@@ -133,6 +134,9 @@ def _sense(
     if c.turns:
         turn = turning_on_sleeve(C, xyz(V[c.sleeve], 0), c.turning, c.turning_damping)
         torque = plus(torque, turn)
+    if c.grain_stiffness + c.slow_stiffness > 0.0:
+        turn, pull = tissue_on_sleeve(c, X, pose_in(X, c.wall).p, C.p)
+        torque, push = plus(torque, turn), plus(push, pull)
     weight = scaled(c.mass, xyz(c.gravity, 0))
     f, m = balance(dh, dp, load, centre, weight, C.p, torque, push, M)
     return Moving(turning, pushing, w, v, v_C, time, f, m, alpha, a, a_C), mount
@@ -221,6 +225,7 @@ class WristSensor(StepBlock):
             turning=np.array(abdomen.bushing.torque_stiffness_constants()),
             turning_damping=np.array(abdomen.bushing.torque_damping_constants()),
             half=0.5 * period,
+            **tissue_record(abdomen.params.tissue, abdomen.slow),
         )
         self._tree = read_tree(plant)
         start = plant.GetPositionsAndVelocities(self._own)

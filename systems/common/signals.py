@@ -158,6 +158,15 @@ class ShaftMotion(NamedTuple):
     ]
 
 
+class Bend(NamedTuple):
+    """How the robot's shaft is bent: where its end is, against a straight one."""
+
+    tip: Annotated[Vector, Field("m", "of the tip, in W", (1e-4, 0.0, 0.0))]
+    turn: Annotated[
+        Vector, Field("rad", "of the end, in W", (0.0, 5e-4, 0.0), ("tx", "ty", "tz"))
+    ]
+
+
 class Wrench(NamedTuple):
     """What the wall does to the shaft."""
 

@@ -6,14 +6,22 @@ from plants.arm.controller_plant import INSTRUMENT_TIP, make_controller_plant
 from plants.arm.signals import ArmState
 from plants.instruments.instrument import InstrumentParams
 from systems.common.compiled import compiled
+from systems.common.geometry import plus
 from systems.common.serial_arm import read_arm, tip_position
-from systems.common.signals import Point, RobotTool
+from systems.common.signals import Bend, Point, RobotTool
 from systems.common.step_block import StepBlock
 
 
 @compiled
 def _robot_tool(arm: Any, state: ArmState, fulcrum: Point) -> tuple[RobotTool]:
     return (RobotTool(fulcrum.p, tip_position(arm, state.q)),)
+
+
+@compiled
+def _bent_tool(
+    arm: Any, state: ArmState, fulcrum: Point, bend: Bend
+) -> tuple[RobotTool]:
+    return (RobotTool(fulcrum.p, plus(tip_position(arm, state.q), bend.tip)),)
 
 
 class RobotLocation(StepBlock):
@@ -25,17 +33,22 @@ class RobotLocation(StepBlock):
 
     Port ``fulcrum`` accepts G_R, the `Point` that the shaft pivots about.
 
+    Port ``bend`` accepts the shaft's `Bend`, where it is told.
+
     Port ``robot_tool`` emits the `RobotTool`, its tip as measured.
     """
 
-    def __init__(self, instrument: InstrumentParams | None = None) -> None:
-        """Makes the block for an arm that carries an instrument."""
+    def __init__(
+        self, instrument: InstrumentParams | None = None, bends: bool = False
+    ) -> None:
+        """Makes the block for an arm and its instrument, and if its bend is told."""
         super().__init__()
         plant = make_controller_plant(instrument=instrument)
+        inputs = {"arm_state": ArmState, "fulcrum": Point}
         self.declare_map(
-            _robot_tool,
+            _bent_tool if bends else _robot_tool,
             [read_arm(plant, plant.GetFrameByName(INSTRUMENT_TIP))],
-            {"arm_state": ArmState, "fulcrum": Point},
+            inputs | ({"bend": Bend} if bends else {}),
             "robot_tool",
             RobotTool,
         )

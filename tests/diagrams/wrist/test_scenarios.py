@@ -31,6 +31,15 @@ def test_arcs_under_breathing():
     assert figures["breathing_rate_estimate"] == pytest.approx(0.2, rel=0.02)
 
 
+def test_a_bent_shaft_is_led_as_a_straight_one():
+    bent = ["duration=6", "compare=[]", "instrument.bending_stiffness=5.3"]
+    blind = run("pwe_arc", *bent).metrics
+    told = run("pwe_arc", *bent, "shaft_bend.active=true").metrics
+    assert told["rms_lateral_force"] <= 0.5 * blind["rms_lateral_force"]
+    assert told["rms_lateral_force"] <= 0.03
+    assert told["rms_bend_error"] <= 2e-4
+
+
 def test_step_of_the_wall():
     figures = run("pwe_step").metrics
     assert figures["time_to_2N"] <= 0.25

@@ -4,6 +4,11 @@ import math
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    ForceElementIndex,
+    JacobianWrtVariable,
+    RevoluteSpring,
+)
 import pytest
 
 from plants.instruments.instrument import InstrumentParams, add_instrument
@@ -26,6 +31,27 @@ def test_tip_mass_and_centre():
     assert params.centre == pytest.approx(centre)
     np.testing.assert_allclose(inertia.get_com(), [0, 0, centre], atol=1e-12)
     assert instrument.shaft_geometry is None  # no SceneGraph here
+
+
+def test_a_shaft_that_bends_gives_way_as_a_beam_and_weighs_the_same():
+    params = InstrumentParams(bending_stiffness=5.3, gauze_mass=0.02)
+    plant = MultibodyPlant(time_step=0.0)
+    tool = add_instrument(plant, plant.world_frame(), params)
+    plant.Finalize()
+    context, world = plant.CreateDefaultContext(), plant.world_frame()
+    assert plant.CalcTotalMass(context) == pytest.approx(params.mass)
+    centre = plant.CalcCenterOfMassPositionInWorld(context)
+    np.testing.assert_allclose(centre, [0, 0, params.centre], atol=3e-4)
+    J = plant.CalcJacobianSpatialVelocity(
+        context, JacobianWrtVariable.kV, tool.tip, np.zeros(3), world, world
+    )
+    elements = map(ForceElementIndex, range(plant.num_force_elements()))
+    springs = [plant.get_force_element(i) for i in elements]
+    k = [s.GetStiffness(context) for s in springs if isinstance(s, RevoluteSpring)]
+    long, force = params.length - params.mount_length, np.array([0.8, -0.6, 0.0])
+    turn, way = np.split(J @ (J[3:].T @ force / k), 2)
+    np.testing.assert_allclose(way, force * long**3 / (3 * 5.3), rtol=1e-9)
+    assert np.linalg.norm(turn) == pytest.approx(long**2 / (2 * 5.3))
 
 
 @pytest.mark.parametrize("gauze", [0.0, 0.02])

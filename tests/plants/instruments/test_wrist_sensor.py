@@ -18,11 +18,16 @@ from systems.common.signal import view
 PERIOD = 1.0 / 120.0
 
 
-def rows(load: float) -> tuple[np.ndarray, np.ndarray]:
+TISSUE = [
+    *("abdomen.tissue.grain_stiffness=300", "abdomen.tissue.grain_direction=0.5"),
+    *("abdomen.tissue.slow_stiffness=400", "abdomen.tissue.slow_time=0.5"),
+]
+
+
+def rows(load: float, more: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Reactions (n, 6) as the plant and as the sensor have them: the arm swings."""
-    scenario = load_scenario(
-        "pwe_breathing", ["wall_motion.rate=0.3", "compare=[]"], duration=3.0
-    )
+    sets = ["wall_motion.rate=0.3", "compare=[]", *more]
+    scenario = load_scenario("pwe_breathing", sets, duration=3.0)
     builder = DiagramBuilder()
     bedside = add_bedside(builder, scenario)
     plant = bedside.systems["plant"]
@@ -62,8 +67,8 @@ def rows(load: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_it_reads_what_the_weld_transmits():
-    for load in (0.0, 2.0):
-        true, felt = rows(load)
+    for load, more in ((0.0, []), (2.0, []), (0.0, TISSUE)):
+        true, felt = rows(load, more)
         late = slice(60, None)  # the start's jerk has died away
         error = felt[late] - true[late]
         assert np.sqrt((error[:, :3] ** 2).mean()) < 0.02  # half a period of its rate
@@ -73,5 +78,5 @@ def test_it_reads_what_the_weld_transmits():
 
 
 def test_a_load_at_the_shaft_is_felt():
-    change = rows(2.0)[1][100:] - rows(0.0)[1][100:]
+    change = rows(2.0, [])[1][100:] - rows(0.0, [])[1][100:]
     assert np.linalg.norm(change[:, :3], axis=1).mean() > 0.5
