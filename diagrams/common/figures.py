@@ -30,6 +30,8 @@ FIGURES = {
     "min_gauze_clearance": Figure("m", "least true gap of gauze to the obstacle tools"),
     "unavoidable": Figure("", "whether no dodge by who is told the future kept clear"),
     "registration_error": Figure("m", "of the tool as the tracker has it, at the end"),
+    "max_hand_force": Figure("N", "greatest of the robot's tool on the obstacle tools"),
+    "max_grip_force": Figure("N", "of it in the hand that holds the tool"),
     "rms_tip_force_error": Figure("N", "of the force told at the tip, rms"),
     "min_target_clearance": Figure("m", "least true gap to the surgeon's tool"),
     "min_camera_clearance": Figure("m", "least true gap to the endoscope"),

@@ -22,6 +22,7 @@ from plants.arm.arm import ArmParams
 from plants.instruments.instrument import DRY_GAUZE, InstrumentParams
 from plants.organs.organ_touch import OrganTouchParams
 from plants.organs.organs import Organ, surface_of
+from plants.surgeon.held_tools import HeldToolsParams
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
 from plants.surgeon.synthetic_hand import SyntheticHand
@@ -46,9 +47,11 @@ from systems.motion.tool_navigation import (
     constants,
     reachable,
 )
+from systems.motion.touch_yield import TouchYieldParams
 from systems.sensing.optical_tracker import OpticalTrackerParams
 from systems.sensing.registration import RegistrationParams
 from systems.sensing.tissue_force import TissueForceParams
+from systems.sensing.touch_watch import TouchWatchParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 BEHAVIOURS = ("bypass", "field")
@@ -76,6 +79,7 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     )
     robot: ToolAtStart = part(ToolAtStart)
     tools: list[Tool] = field(default_factory=usual_tools)
+    held_tools: HeldToolsParams = part(HeldToolsParams)
     organs: list[Organ] = parameter([], "of the patient", shape=(-1,))
     camera_planner: CameraPlannerParams = part(CameraPlannerParams)
     judge_sight: bool = parameter(
@@ -102,6 +106,8 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     velocity_corrections: VelocityCorrectionsParams = part(VelocityCorrectionsParams)
     backward_movement: BackwardMovementParams = part(BackwardMovementParams)
     fuzzy_arbiter: FuzzyArbiterParams = part(FuzzyArbiterParams)
+    touch_watch: TouchWatchParams = part(TouchWatchParams)
+    touch_yield: TouchYieldParams = part(TouchYieldParams)
     navigation: ToolNavigationParams = part(ToolNavigationParams)
     joints: JointCommandsParams = part(JointCommandsParams)
     arm: ArmParams = part(ArmParams)
@@ -132,14 +138,19 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
 
     @property
     def emulated(self) -> bool:
-        """Whether the passive wrist is in the diagram: its fulcrum is not given."""
-        return self.wrist != "known" or not self.wall_motion.still
+        """Whether wrist sensor and passive wrist are in the diagram.
+
+        They are where the fulcrum is not given, and where tools can touch.
+        """
+        told = self.wrist == "known" and self.wall_motion.still
+        return not told or self.held_tools.active
 
     def rules(self) -> Rules:
         """What must hold across fields."""
         yield from tool_rules(self)
         yield from super().rules()
         yield from organ_rules(self)
+        yield from contact_rules(self)
         yield from reach_rules(self)
 
 
@@ -202,6 +213,18 @@ def organ_rules(scenario: GauzeScenario) -> Rules:
     alone = not (press and scenario.tip_load.active)
     told = "False with press.active, which tells what touches the tip itself"
     yield alone, "tip_load.active", told
+
+
+def contact_rules(scenario: GauzeScenario) -> Rules:
+    """What is touched is felt, and what is held is led by a hand."""
+    felt = not scenario.touch_yield.active or scenario.tip_load.active
+    felt = felt and (scenario.emulated or not scenario.touch_yield.active)
+    told = "True with touch_yield.active, which is told of a touch by it"
+    yield felt, "tip_load.active", told
+    for tool in scenario.obstacles:
+        led = not (scenario.held_tools.active and tool.tracked is not None)
+        told = "None with held_tools.active: what was seen cannot be pushed"
+        yield led, f"{tool.name}.tracked", told
 
 
 def tool_rules(scenario: GauzeScenario) -> Rules:
