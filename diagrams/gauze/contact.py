@@ -83,9 +83,10 @@ def wires(scenario: Any) -> list[tuple[str, str]]:
 
 YIELD_WIRES = (
     ("tool_wrench.shaft", "touch_watch.shaft"),
-    ("tip_load.wall", "touch_watch.wrench"),
-    ("tip_load.tip_force", "touch_watch.tip_force"),
-    ("touch_watch.wall", "wrench_watch.wrench"),
+    ("fulcrum_estimator.estimate", "touch_watch.estimate"),
+    ("passive_wrist.permission", "touch_watch.permission"),
+    ("wrench_watch.believed", "touch_watch.believed"),
+    ("touch_watch.told", "fulcrum_estimator.wrench"),
     ("clearance_constraint.v_safe", "touch_yield.v_safe"),
     ("go_to_target.guide", "touch_yield.guide"),
     ("passive_wrist.permission", "touch_yield.wrist"),
@@ -106,7 +107,11 @@ def add_yield(builder: Any, scenario: Any) -> dict[str, Any]:
         period=navigation.period,
         least_guide=navigation.min_proportion,
     )
-    watch = replace(scenario.touch_watch, period=scenario.tip_load.period)
+    watch = replace(
+        scenario.touch_watch,
+        period=scenario.tool_wrench.period,
+        length=scenario.instrument.length,
+    )
     systems = {"touch_watch": TouchWatch(watch), "touch_yield": TouchYield(how)}
     return {n: builder.AddNamedSystem(n, block) for n, block in systems.items()}
 
@@ -116,7 +121,9 @@ def yielding(scenario: Any, wires: list[tuple[str, str]]) -> list[tuple[str, str
     if not scenario.touch_yield.active:
         return wires
     taken = {sink for _, sink in YIELD_WIRES}
-    return [*(wire for wire in wires if wire[1] not in taken), *YIELD_WIRES]
+    sensed, wall = "tool_wrench.wrench", "touch_watch.wall"
+    kept = [(wall if s == sensed else s, t) for s, t in wires if t not in taken]
+    return [*kept, *YIELD_WIRES, (sensed, "touch_watch.wrench")]
 
 
 def exports(scenario: Any) -> dict[str, str]:

@@ -216,11 +216,12 @@ def organ_rules(scenario: GauzeScenario) -> Rules:
 
 
 def contact_rules(scenario: GauzeScenario) -> Rules:
-    """What is touched is felt, and what is held is led by a hand."""
-    felt = not scenario.touch_yield.active or scenario.tip_load.active
-    felt = felt and (scenario.emulated or not scenario.touch_yield.active)
-    told = "True with touch_yield.active, which is told of a touch by it"
-    yield felt, "tip_load.active", told
+    """Who gives way feels; does not press; and what is held is led by a hand."""
+    gives_way = scenario.touch_yield.active
+    told = "'pwe' with touch_yield.active, which needs the wrist's sensor"
+    yield not gives_way or scenario.emulated, "wrist", told
+    told = "False with press.active, whose own touch it would take for a push"
+    yield not (gives_way and scenario.press.active), "touch_yield.active", told
     for tool in scenario.obstacles:
         led = not (scenario.held_tools.active and tool.tracked is not None)
         told = "None with held_tools.active: what was seen cannot be pushed"
