@@ -31,10 +31,12 @@ class TouchYieldParams:
     """How the robot gives way to what pushes its tool."""
 
     active: bool = parameter(False, "whether a touch stops the task")
+    # With what holds the other tool, some 250 N/m, and 60 ms of delay A k tau is 0.5;
+    # with 0.05 the tools bounce, with up to 11 N.
     admittance: float = parameter(
-        0.05, "A, speed for a force, where it acts", "m/(N s)", above=0, most=1
+        0.03, "A, speed for a force, where it acts", "m/(N s)", above=0, most=1
     )
-    borne: float = parameter(0.3, "f_0, force that is borne", "N", least=0, most=5)
+    borne: float = parameter(0.2, "f_0, force that is borne", "N", least=0, most=5)
     speed: float = parameter(0.2, "of the tip, at the most", "m/s", above=0, most=0.5)
     acceleration: float = parameter(
         1.5, "of the tip, at the most", "m/s^2", above=0, most=20
