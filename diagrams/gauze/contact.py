@@ -89,6 +89,7 @@ YIELD_WIRES = (
     ("touch_watch.told", "fulcrum_estimator.wrench"),
     ("clearance_constraint.v_safe", "touch_yield.v_safe"),
     ("go_to_target.guide", "touch_yield.guide"),
+    ("robot_location.robot_tool", "touch_yield.robot_tool"),
     ("passive_wrist.permission", "touch_yield.wrist"),
     ("touch_watch.touch", "touch_yield.touch"),
     ("touch_yield.v_R", "tool_navigation.v_R"),

@@ -7,22 +7,40 @@ something pushes the shaft, its place there goes with the force, through the ful
     v = A f (1 - f_0 / |f|),    at the tip v / share,
 
 A being the admittance, and f_0 the force that is borne. The task waits, with its
-reason, and goes on a while after; neither goal nor other tools lead R meanwhile.
+reason, and goes on a while after. What leads R meanwhile is the push alone, but for a
+withdrawal along its own shaft that is under way, which takes no new room.
 """
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import limited, norm, plus, scaled, sub
+from systems.common.geometry import (
+    along,
+    dot,
+    limited,
+    norm,
+    plus,
+    scaled,
+    sub,
+    unit,
+)
 from systems.common.parameter import check, parameter
 from systems.common.signal import Vector, finiteness
-from systems.common.signals import FREE, Guide, Permission, Velocity
+from systems.common.signals import (
+    FREE,
+    Guide,
+    Permission,
+    RobotTool,
+    Velocity,
+    finite_guide,
+    finite_tool,
+)
 from systems.common.step_block import StepBlock
 from systems.common.stops import Stop
 from systems.sensing.touch_watch import Touched
 
-finite_touch, finite_guide = finiteness(Touched), finiteness(Guide)
+finite_touch, finite_velocity = finiteness(Touched), finiteness(Velocity)
 _TOUCHED = float(Stop.TOUCHED)
 
 
@@ -36,7 +54,7 @@ class TouchYieldParams:
     admittance: float = parameter(
         0.03, "A, speed for a force, where it acts", "m/(N s)", above=0, most=1
     )
-    borne: float = parameter(0.2, "f_0, force that is borne", "N", least=0, most=5)
+    borne: float = parameter(0.1, "f_0, force that is borne", "N", least=0, most=5)
     speed: float = parameter(0.2, "of the tip, at the most", "m/s", above=0, most=0.5)
     acceleration: float = parameter(
         1.5, "of the tip, at the most", "m/s^2", above=0, most=20
@@ -66,11 +84,13 @@ def give_way(
     old: Yielding,
     v_safe: Velocity,
     guide: Guide,
+    robot: RobotTool,
     permission: Permission,
     touch: Touched,
 ) -> tuple[Yielding, Velocity, Permission]:
     """One step: what is remembered, the guide point's velocity, and the permission."""
-    sound = finite_touch(touch) and finite_guide(guide)
+    sound = finite_touch(touch) and finite_guide(guide) and finite_tool(robot)
+    s = max(guide.s, c.least_guide)
     pushed = sound and touch.touched > 0.5
     left = c.wait if pushed else max(old.left - c.period, 0.0)
     if left <= 0.0:
@@ -81,7 +101,10 @@ def give_way(
         rate = c.admittance * over / max(touch.share, c.least_share)
         wanted = limited(scaled(rate, touch.f), c.speed)
     v = plus(old.v, limited(sub(wanted, old.v), c.acceleration * c.period))
-    v_R = Velocity(scaled(max(guide.s, c.least_guide), v))
+    v_R = Velocity(scaled(s, v))
+    if sound and finite_velocity(v_safe):
+        u = unit(sub(robot.tip, robot.fulcrum))
+        v_R = Velocity(along(v_R.v, min(0.0, dot(v_safe.v, u)), u))
     return Yielding(v, left), v_R, Permission(0.0, _TOUCHED)
 
 
@@ -91,6 +114,8 @@ class TouchYield(StepBlock):
     Port ``v_safe`` accepts the `Velocity` of the guide point.
 
     Port ``guide`` accepts the `Guide`, of which s is used.
+
+    Port ``robot_tool`` accepts the `RobotTool`.
 
     Port ``wrist`` accepts the passive wrist's `Permission`; free without a wire.
 
@@ -111,6 +136,7 @@ class TouchYield(StepBlock):
             {
                 "v_safe": Velocity,
                 "guide": Guide,
+                "robot_tool": RobotTool,
                 "wrist": Permission,
                 "touch": Touched,
             },
