@@ -218,8 +218,10 @@ def organ_rules(scenario: GauzeScenario) -> Rules:
 def contact_rules(scenario: GauzeScenario) -> Rules:
     """Who gives way feels; does not press; and what is held is led by a hand."""
     gives_way = scenario.touch_yield.active
-    told = "'pwe' with touch_yield.active, which needs the wrist's sensor"
-    yield not gives_way or scenario.emulated, "wrist", told
+    told = (
+        "'pwe' with touch_yield.active: a push is told by its moment about the fulcrum"
+    )
+    yield not gives_way or scenario.wrist == "pwe", "wrist", told
     told = "False with press.active, whose own touch it would take for a push"
     yield not (gives_way and scenario.press.active), "touch_yield.active", told
     for tool in scenario.obstacles:

@@ -176,9 +176,7 @@ def add_held_tool(
     plant.set_gravity_enabled(instance, False)  # the hand carries it
     material = ProximityProperties()
     friction = CoulombFriction(params.friction, params.friction)
-    AddContactMaterial(
-        params.dissipation, params.contact_stiffness, friction, material
-    )
+    AddContactMaterial(params.dissipation, params.contact_stiffness, friction, material)
     radius = 0.5 * params.diameter
     shaft = plant.RegisterCollisionGeometry(
         body,
@@ -301,8 +299,8 @@ class HeldTools(Block):
         """Of each tool f, p and grip, and then the moment and force on the robot."""
         results = self._results.Eval(context)
         forces = np.zeros((len(self._bodies), 7))
-        for k, tip in enumerate(self._bodies):
-            forces[k, 3:6] = self._shaft(context, k)[:3]
+        for k, row in enumerate(forces):
+            row[3:6] = self._shaft(context, k)[:3]
         load = np.zeros(6)
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
