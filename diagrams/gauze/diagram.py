@@ -14,7 +14,8 @@ from pydrake.systems.primitives import (
 
 from diagrams.bedside.wrist import add_wrist, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
-from diagrams.gauze import contact, organs as inside
+from diagrams.gauze import contact
+from diagrams.gauze import organs as inside
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
 from diagrams.gauze.tools import OBSTACLE, HandTool, hands

@@ -226,8 +226,8 @@ def contact_rules(scenario: GauzeScenario) -> Rules:
     yield not (gives_way and scenario.press.active), "touch_yield.active", told
     for tool in scenario.obstacles:
         led = not (scenario.held_tools.active and tool.tracked is not None)
-        told = "None with held_tools.active: what was seen cannot be pushed"
-        yield led, f"{tool.name}.tracked", told
+        told = f"no {tool.name}.tracked with held_tools.active: it cannot be pushed"
+        yield led, "tools", told
 
 
 def tool_rules(scenario: GauzeScenario) -> Rules:

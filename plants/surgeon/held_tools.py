@@ -11,6 +11,7 @@ A relaxed arm's hand has 100 to 500 N/m in the plane (Mussa-Ivaldi, Hogan and Bi
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import asin, atan2, cos, sin
 from typing import Annotated, Any, NamedTuple
 
@@ -39,15 +40,15 @@ from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.geometry import across, along, dot, norm, plus, sub
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field, Many, Vector, size, view, writer
+from systems.common.signal import Field, Many, Vector, reader, size, vector, writer
 from systems.common.signals import Shaft
 
 DEGREES = 5
-"""Of freedom of a tool: its trocar's x and y in m, its tilt about x and y, depth in m."""
+"""Of freedom of a tool: its trocar's x and y, its tilt about x and y, its depth."""
 _LEAN = 0.02
 """Mass of a trocar that moves, kg."""
 _STILL = (0.0, 0.0, 0.0)
-write_shaft = writer(Shaft)
+read_shaft, write_shaft = reader(Shaft), writer(Shaft)
 
 
 class HandForce(NamedTuple):
@@ -79,8 +80,8 @@ class HeldToolsParams:
     )
     trocar_damping: float = parameter(5.0, "of it", "N s/m", least=0.5, most=100)
     # 0.25 mm at 5 N. Real shafts bend: a tube (3 E I / l^3) has 3e3 N/m 150 mm from its
-    # trocar; but from 1 mm of penetration on Drake 1.58 turns the normal of two capsules
-    # that cross, and they pass each other: seen with 5e3.
+    # trocar; but from 1 mm of penetration on Drake 1.58 turns the normal of two that
+    # cross, and they pass each other: seen with 5e3.
     contact_stiffness: float = parameter(
         2e4, "of two shafts that touch", "N/m", least=1e4, most=1e6
     )
@@ -246,10 +247,10 @@ class HeldTools(Block):
         """
         super().__init__()
         self._params = check(params)
-        k, d = params.gains()
+        stiffness, damping = params.gains()
         # As `SetPoint` has it: meant for the end of the hold, its speed in its place.
-        self._lead = d / k + params.period
-        self._p_WG = [tuple(tool.p_WG) for tool in held.values()]
+        self._lead = damping / stiffness + params.period
+        self._p_WG = [vector(tool.p_WG) for tool in held.values()]
         self._bodies = [int(tool.body.index()) for tool in held.values()]
         self._wished = [self.signal_in(name, Shaft) for name in held]
         at = np.array([starts[name] for name in held])
@@ -267,13 +268,9 @@ class HeldTools(Block):
             self.DeclareStateOutputPort(f"{name}_desired", place)
         self.DeclareDiscreteState(at.ravel())  # where they were wished to be
         self.DeclareDiscreteState(len(held))  # the peaks
-        for k_, name in enumerate(held):
-            port = self._states[k_]
-
-            def calc(context: Any, k: int = k_) -> np.ndarray:
-                return self._shaft(context, k)
-
-            self.signal_out(f"{name}_shaft", Shaft, calc, {port.ticket()})
+        for k, name in enumerate(held):
+            calc = partial(self._shaft, k)
+            self.signal_out(f"{name}_shaft", Shaft, calc, {self._states[k].ticket()})
         reads = {self._results.ticket(), *(p.ticket() for p in self._states)}
         self._felt = self.cached("felt", self._calc_felt, reads)
         n = len(held) * (size(HandForce) - 1)
@@ -291,7 +288,7 @@ class HeldTools(Block):
         )
         self.update_every(params.period, self._next)
 
-    def _shaft(self, context: Any, k: int) -> np.ndarray:
+    def _shaft(self, k: int, context: Any) -> np.ndarray:
         q = self._states[k].Eval(context)[:DEGREES]
         return write_shaft(shaft_of(self._p_WG[k], q))
 
@@ -300,7 +297,7 @@ class HeldTools(Block):
         results = self._results.Eval(context)
         forces = np.zeros((len(self._bodies), 7))
         for k, row in enumerate(forces):
-            row[3:6] = self._shaft(context, k)[:3]
+            row[3:6] = self._shaft(k, context)[:3]
         load = np.zeros(6)
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
@@ -313,9 +310,9 @@ class HeldTools(Block):
             load[:3] -= np.cross(p, f)
             load[3:] -= f
         for k, row in enumerate(forces):
-            u = tuple(self._shaft(context, k)[3:])
-            told = self._p_WG[k], self._params.lever, tuple(row[:3]), tuple(row[3:6])
-            row[6] = in_hand(*told, u) if row[:3].any() else 0.0
+            u = vector(self._shaft(k, context)[3:])
+            f, p = vector(row[:3]), vector(row[3:6])
+            row[6] = in_hand(self._p_WG[k], self._params.lever, f, p, u)
         return np.concatenate([forces.ravel(), load])
 
     def _calc_hand_force(self, context: Any) -> np.ndarray:
@@ -330,7 +327,7 @@ class HeldTools(Block):
         peaks = self._calc_hand_force(context).reshape(n, -1)[:, -1]
         wished = np.array(
             [
-                joints_of(p_WG, view(Shaft, port.Eval(context)))
+                joints_of(p_WG, read_shaft(port.Eval(context)))
                 for p_WG, port in zip(self._p_WG, self._wished, strict=True)
             ]
         )
