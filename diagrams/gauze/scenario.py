@@ -222,6 +222,9 @@ def contact_rules(scenario: GauzeScenario) -> Rules:
         "'pwe' with touch_yield.active: a push is told by its moment about the fulcrum"
     )
     yield not gives_way or scenario.wrist == "pwe", "wrist", told
+    rests = scenario.wall_motion.still and not scenario.abdomen.turning_stiffness
+    told = "False where wall or trocar load the shaft: it is taken for a push"
+    yield not gives_way or rests, "touch_yield.active", told
     told = "False with press.active, whose own touch it would take for a push"
     yield not (gives_way and scenario.press.active), "touch_yield.active", told
     for tool in scenario.obstacles:

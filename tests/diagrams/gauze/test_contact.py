@@ -40,6 +40,8 @@ def test_who_does_not_give_way_is_pushed_harder():
         ("wrist=known", "wrist='known': expected 'pwe' with touch_yield.active"),
         ("obstacle.tracked=''", "no obstacle.tracked with held_tools.active"),
         ("held_tools.contact_stiffness=5e3", "expected >= 1"),
+        ("wall_motion.breathing=[0.003, 0, 0]", "False where wall or trocar load"),
+        ("abdomen.turning_stiffness=0.3", "False where wall or trocar load"),
     ],
 )
 def test_what_cannot_be_is_refused(change, said):
