@@ -1,7 +1,7 @@
 """The robot at the bedside: arm, instrument and abdomen in one continuous plant."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -55,6 +55,7 @@ class Bedside:
         instrument: The robot's instrument.
         abdomen: The abdomen.
         below: Model instances of all that hangs on the wrist's sensor.
+        held: The surgeon's tools that have contact with the robot's, by their names.
     """
 
     systems: dict[str, Any]
@@ -62,12 +63,14 @@ class Bedside:
     instrument: Instrument
     abdomen: Abdomen
     below: list[Any]
+    held: dict[str, Any] = field(default_factory=dict)
 
 
 def add_bedside(
     builder: Any,
     scenario: Any,
     hang: Callable[[Any, Any], list[Any]] = lambda plant, instrument: [],
+    hold: Callable[[Any, Any], dict[str, Any]] = lambda plant, scene_graph: {},
 ) -> Bedside:
     """Adds arm, instrument and abdomen to a diagram.
 
@@ -79,6 +82,7 @@ def add_bedside(
             `duration`, and may have `tip_push`.
         hang: Adds what else hangs on the instrument to the plant that is not yet
             finalized, and returns its model instances.
+        hold: Likewise adds the tools that people hold, if the robot's can touch them.
 
     Raises:
         ValueError: If the start cannot be reached.
@@ -98,8 +102,9 @@ def add_bedside(
     )
     below = [instrument.instance, abdomen.sleeve_instance, *hang(plant, instrument)]
     add_scenery(plant, BASE_POSITION, not getattr(scenario, "organs", []))
+    held = hold(plant, scene_graph)
     plant.Finalize()
-    connect_poses(builder, plant, scene_graph)
+    connect_poses(builder, plant, scene_graph, touches=bool(held))
     moved = motion.displacement(0.0)
     p_WG = np.add(scenario.robot.p_WG, moved)
     known = plant
@@ -131,7 +136,7 @@ def add_bedside(
         systems["tool_shaft"] = add_tool_shaft(builder, plant, instrument)
     if push:
         systems["tip_push"] = push
-    return Bedside(systems, posture, instrument, abdomen, below)
+    return Bedside(systems, posture, instrument, abdomen, below, held)
 
 
 def stiffen(case: Any, station: Any, context: Any) -> None:

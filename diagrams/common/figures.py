@@ -33,6 +33,8 @@ FIGURES = {
     "rms_bend": Figure("m", "of the tip by the shaft's bend, rms"),
     "max_bend": Figure("m", "the same, greatest"),
     "rms_bend_error": Figure("m", "of the tip that is told, from the true one, rms"),
+    "max_hand_force": Figure("N", "greatest of the robot's tool on the obstacle tools"),
+    "max_grip_force": Figure("N", "of it in the hand that holds the tool"),
     "rms_tip_force_error": Figure("N", "of the force told at the tip, rms"),
     "min_target_clearance": Figure("m", "least true gap to the surgeon's tool"),
     "min_camera_clearance": Figure("m", "least true gap to the endoscope"),

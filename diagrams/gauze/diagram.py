@@ -14,6 +14,7 @@ from pydrake.systems.primitives import (
 
 from diagrams.bedside.wrist import add_wrist, unbent, wrist_exports, wrist_wires
 from diagrams.common.wiring import add_blocks, finish, has_input, has_output
+from diagrams.gauze import contact
 from diagrams.gauze import organs as inside
 from diagrams.gauze.scenario import GauzeScenario
 from diagrams.gauze.theatre import add_theatre
@@ -99,12 +100,13 @@ def tool_wires(scenario: GauzeScenario) -> list[tuple[str, str]]:
         ("endoscope.shaft", f"clearance.{scenario.camera.name}"),
     ]
     for name, tool in hands(scenario.tools, scenario.seed).items():
-        shown = "shaft" if tool.tracked is None else "shown"
+        shaft = contact.shaft_port(scenario, name)
+        shown = shaft if tool.tracked is None else f"{name}_tool.shown"
         wires += [
-            (f"{name}_tool.{shown}", f"optical_tracker.{name}"),
+            (shown, f"optical_tracker.{name}"),
             *seen(name, scenario.registration.active),
-            (f"{name}_tool.shaft", f"posed_tools.{name}"),
-            (f"{name}_tool.shaft", f"clearance.{name}"),
+            (shaft, f"posed_tools.{name}"),
+            (shaft, f"clearance.{name}"),
         ]
         if tool.hunt.speed:
             wires.append(("robot_location.robot_tool", f"{name}_tool.robot_tool"))
@@ -193,7 +195,7 @@ def tool_exports(scenario: GauzeScenario) -> dict[str, str]:
     exports: dict[str, str] = {}
     for name in hands(scenario.tools, scenario.seed):
         exports |= {
-            f"{name}.shaft": f"{name}_tool.shaft",
+            f"{name}.shaft": contact.shaft_port(scenario, name),
             f"{name}.tip_velocity": f"{name}_tool.tip_velocity",
             f"{name}.estimate": f"{name}_estimator.estimate",
         }
@@ -315,8 +317,8 @@ def wiring(
         scenario: The parameters.
         systems: Plant and blocks by their names.
     """
-    wires = [*WIRES, *tool_wires(scenario)]
-    exports = EXPORTS | tool_exports(scenario)
+    wires = [*WIRES, *tool_wires(scenario), *contact.wires(scenario)]
+    exports = EXPORTS | tool_exports(scenario) | contact.exports(scenario)
     if scenario.emulated:
         wires = [
             *(wire for wire in wires if wire not in TOLD),
@@ -324,6 +326,7 @@ def wiring(
             *wrist_wires(scenario),
         ]
         exports |= wrist_exports(scenario)
+    wires = contact.yielding(scenario, wires)
     if scenario.registration.active:
         wires += REGISTERED
         exports |= {"tracker.alignment": "registration.alignment"}
@@ -368,10 +371,12 @@ def make_gauze_diagram(
     made = make_blocks(scenario, theatre.posture, organs)
     blocks = add_blocks(builder, made, swaps)
     systems = theatre.systems | blocks
+    systems |= contact.add_contact(builder, scenario, theatre, blocks)
     if organs is not None:
         systems |= inside.add_organs(builder, scenario, theatre, organs)
     if scenario.emulated:
         systems |= add_wrist(builder, theatre, scenario)
+    systems |= contact.add_yield(builder, scenario)
     if organs is not None and scenario.press.active:
         systems |= inside.add_press(builder, scenario, organs)
     wires, exports = wiring(scenario, systems)

@@ -12,6 +12,7 @@ from diagrams.bedside.wrist_metrics import (
     wrist_figures,
 )
 from diagrams.gauze.bypass_metrics import bypass_figures
+from diagrams.gauze.contact import contact_figures
 from diagrams.gauze.foresight import Reach, unavoidable
 from diagrams.gauze.organs import organ_figures
 from diagrams.gauze.scenes import CONTACT
@@ -162,7 +163,7 @@ def measure(run: Any) -> dict[str, Any]:
     if run.scenario.registration.active:
         figures["registration_error"] = registration_error(run)
     figures |= bypass_figures(run, arrival, tip_error) | organ_figures(run)
-    figures |= sight_figures(run)
+    figures |= sight_figures(run) | contact_figures(run)
     if run.scenario.emulated:
         figures |= wrist_figures(run, run.scenario.measure_from)
     return figures

@@ -9,6 +9,7 @@ from diagrams.bedside import wrist_plots
 from diagrams.common.plots import COLORS, add_axes, equal_axes, new_figure
 from diagrams.gauze import organ_plots
 from diagrams.gauze.bypass_plots import clearance, forms
+from diagrams.gauze.contact_plots import contact
 from diagrams.gauze.scenario import PAPER
 from diagrams.gauze.tools import TARGET, gap, logged
 from systems.common.geometry import closest_points
@@ -167,6 +168,8 @@ def plots(run: Any) -> dict[str, Figure]:
     }
     if run.scenario.organs:
         figures["organs"] = organ_plots.organs(run)
+    if run.scenario.held_tools.active:
+        figures["contact"] = contact(run)
     if run.scenario.judge_sight:
         figures["sight"] = organ_plots.sight(run)
     if PAPER in run.case.companions:

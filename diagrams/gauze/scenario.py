@@ -22,6 +22,7 @@ from plants.arm.arm import ArmParams
 from plants.instruments.instrument import DRY_GAUZE, InstrumentParams
 from plants.organs.organ_touch import OrganTouchParams
 from plants.organs.organs import Organ, surface_of
+from plants.surgeon.held_tools import HeldToolsParams
 from plants.surgeon.hunting_tool import Hunt
 from plants.surgeon.recording import load_recording
 from plants.surgeon.synthetic_hand import SyntheticHand
@@ -46,9 +47,11 @@ from systems.motion.tool_navigation import (
     constants,
     reachable,
 )
+from systems.motion.touch_yield import TouchYieldParams
 from systems.sensing.optical_tracker import OpticalTrackerParams
 from systems.sensing.registration import RegistrationParams
 from systems.sensing.tissue_force import TissueForceParams
+from systems.sensing.touch_watch import TouchWatchParams
 from systems.sensing.trajectory_estimator import TrajectoryEstimatorParams
 
 BEHAVIOURS = ("bypass", "field")
@@ -76,6 +79,7 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     )
     robot: ToolAtStart = part(ToolAtStart)
     tools: list[Tool] = field(default_factory=usual_tools)
+    held_tools: HeldToolsParams = part(HeldToolsParams)
     organs: list[Organ] = parameter([], "of the patient", shape=(-1,))
     camera_planner: CameraPlannerParams = part(CameraPlannerParams)
     judge_sight: bool = parameter(
@@ -102,6 +106,8 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
     velocity_corrections: VelocityCorrectionsParams = part(VelocityCorrectionsParams)
     backward_movement: BackwardMovementParams = part(BackwardMovementParams)
     fuzzy_arbiter: FuzzyArbiterParams = part(FuzzyArbiterParams)
+    touch_watch: TouchWatchParams = part(TouchWatchParams)
+    touch_yield: TouchYieldParams = part(TouchYieldParams)
     navigation: ToolNavigationParams = part(ToolNavigationParams)
     joints: JointCommandsParams = part(JointCommandsParams)
     arm: ArmParams = part(ArmParams)
@@ -132,14 +138,19 @@ class GauzeScenario(Scenario, WristSettings, TipSettings):
 
     @property
     def emulated(self) -> bool:
-        """Whether the passive wrist is in the diagram: its fulcrum is not given."""
-        return self.wrist != "known" or not self.wall_motion.still
+        """Whether wrist sensor and passive wrist are in the diagram.
+
+        They are where the fulcrum is not given, and where tools can touch.
+        """
+        told = self.wrist == "known" and self.wall_motion.still
+        return not told or self.held_tools.active
 
     def rules(self) -> Rules:
         """What must hold across fields."""
         yield from tool_rules(self)
         yield from super().rules()
         yield from organ_rules(self)
+        yield from contact_rules(self)
         yield from reach_rules(self)
 
 
@@ -206,6 +217,24 @@ def organ_rules(scenario: GauzeScenario) -> Rules:
     yield felt, "wrist", "'pwe' with instrument.bending_stiffness: it feels the bend"
     bends = scenario.emulated or not scenario.shaft_bend.active
     yield bends, "shaft_bend.active", "False without the wrist's sensor: wrist=known"
+
+
+def contact_rules(scenario: GauzeScenario) -> Rules:
+    """Who gives way feels; does not press; and what is held is led by a hand."""
+    gives_way = scenario.touch_yield.active
+    told = (
+        "'pwe' with touch_yield.active: a push is told by its moment about the fulcrum"
+    )
+    yield not gives_way or scenario.wrist == "pwe", "wrist", told
+    rests = scenario.wall_motion.still and not scenario.abdomen.turning_stiffness
+    told = "False where wall or trocar load the shaft: it is taken for a push"
+    yield not gives_way or rests, "touch_yield.active", told
+    told = "False with press.active, whose own touch it would take for a push"
+    yield not (gives_way and scenario.press.active), "touch_yield.active", told
+    for tool in scenario.obstacles:
+        led = not (scenario.held_tools.active and tool.tracked is not None)
+        told = f"no {tool.name}.tracked with held_tools.active: it cannot be pushed"
+        yield led, "tools", told
 
 
 def tool_rules(scenario: GauzeScenario) -> Rules:

@@ -10,6 +10,7 @@ from diagrams.bedside.wrist_replay import decorate_wrist
 from diagrams.common.replay import draw_arrow, draw_trail
 from diagrams.common.study import Study, View
 from diagrams.gauze import film
+from diagrams.gauze.contact import contact_signals
 from diagrams.gauze.diagram import make_gauze_diagram
 from diagrams.gauze.ending import ending
 from diagrams.gauze.live import LIVE
@@ -78,7 +79,7 @@ def signals(scenario: GauzeScenario) -> dict[str, Any]:
     ports |= wrist_signals(scenario) if scenario.emulated else {}
     if scenario.registration.active:
         ports["tracker.alignment"] = Alignment
-    ports |= organ_signals(scenario)
+    ports |= organ_signals(scenario) | contact_signals(scenario)
     if scenario.camera_planner.active:
         ports["camera.sight"] = Sight
     if scenario.behaviour != "bypass":

@@ -3,6 +3,7 @@
 from typing import Any
 
 from diagrams.bedside.bedside import Bedside, add_bedside
+from diagrams.gauze import contact
 from diagrams.gauze.tools import in_the_way
 from plants.instruments.clearance import add_clearance
 from plants.instruments.posed_tools import PosedToolsParams, add_posed_tools
@@ -20,7 +21,7 @@ def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> 
     Raises:
         ValueError: If the start cannot be reached.
     """
-    bedside = bedside or add_bedside(builder, scenario)
+    bedside = bedside or add_bedside(builder, scenario, hold=contact.hold(scenario))
     plant, scene_graph = bedside.systems["plant"], bedside.systems["scene_graph"]
     if scenario.registration.active and "tool_shaft" not in bedside.systems:
         bedside.systems["tool_shaft"] = add_tool_shaft(

@@ -234,6 +234,9 @@ class KeyholeScenario(Scenario, WristSettings):
             yield from clearance_rules(self)
         if self.task == "circle":
             circle_postures(self)
+        posed = not self.theatre.held_tools.active
+        posed = posed and not self.theatre.touch_yield.active
+        yield posed, "theatre.held_tools.active", "False: here tools have no contact"
         if self.others:
             for holds, key, expected in tool_rules(self.surgeon):
                 ours = key if key == "duration" else f"theatre.{key}"

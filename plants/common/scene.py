@@ -9,12 +9,11 @@ from pydrake.multibody.plant import MultibodyPlant
 def add_plant_and_scene(builder: Any) -> tuple[Any, Any]:
     """Adds a continuous MultibodyPlant and a SceneGraph, without contact between them.
 
-    CENIC asks for contact geometry several times a step. The project's plants have
-    springs where they touch, so the plant asks a second, empty SceneGraph: bodies
-    that Python blocks pose in the first one are then evaluated only when somebody
-    measures or looks. (It also ends no process: CENIC in Drake 1.58 does, on contact
-    with geometry that the plant does not own.) Call `connect_poses` once the plant is
-    finalized.
+    CENIC asks for contact geometry several times a step. The plant asks a second
+    SceneGraph, which is empty or has the plant's own geometry alone: bodies that Python
+    blocks pose in the first one are then evaluated only when somebody measures or
+    looks. (It also ends no process: CENIC in Drake 1.58 does, on contact with geometry
+    that the plant does not own.) Call `connect_poses` once the plant is finalized.
 
     Returns:
         The plant, named "plant", and the SceneGraph, named "scene_graph".
@@ -25,13 +24,25 @@ def add_plant_and_scene(builder: Any) -> tuple[Any, Any]:
     return plant, scene_graph
 
 
-def connect_poses(builder: Any, plant: Any, scene_graph: Any) -> None:
-    """Lets the SceneGraph follow the finalized plant, and the plant see no contact."""
-    builder.Connect(
-        plant.get_geometry_pose_output_port(),
-        scene_graph.get_source_pose_port(plant.get_source_id()),
+def connect_poses(
+    builder: Any, plant: Any, scene_graph: Any, touches: bool = False
+) -> None:
+    """Lets the SceneGraph follow the finalized plant.
+
+    Args:
+        builder: Of the diagram.
+        plant: The plant.
+        scene_graph: Its SceneGraph, with no geometry but the plant's as yet.
+        touches: Whether the plant's bodies have contact with each other; none if not.
+    """
+    source, poses = plant.get_source_id(), plant.get_geometry_pose_output_port()
+    builder.Connect(poses, scene_graph.get_source_pose_port(source))
+    asked = builder.AddNamedSystem(
+        "contacts" if touches else "no_contacts",
+        scene_graph.Clone() if touches else SceneGraph(),
     )
-    empty = builder.AddNamedSystem("no_contacts", SceneGraph())
+    if touches:
+        builder.Connect(poses, asked.get_source_pose_port(source))
     builder.Connect(
-        empty.get_query_output_port(), plant.get_geometry_query_input_port()
+        asked.get_query_output_port(), plant.get_geometry_query_input_port()
     )

@@ -81,8 +81,8 @@ class Moving(NamedTuple):
 class Load(NamedTuple):
     """What else acts on all below: moment about the world's origin, and force."""
 
-    m: Vector
-    f: Vector
+    m: Annotated[Vector, Field("N m", "moment", _STILL)]
+    f: Annotated[Vector, Field("N", "force", _STILL)]
 
 
 _START = Moving(
@@ -181,6 +181,8 @@ class WristSensor(StepBlock):
     Port ``applied_spatial_force`` accepts what else acts on those bodies, as the
     plant's port of that name does; it need not be connected.
 
+    Port ``touching`` accepts a `Load` more, of tools that touch; none without a wire.
+
     Port ``felt`` emits what is `Felt`, of the last instant of its clock.
 
     Port ``mount`` emits the `Mount` as it is now.
@@ -235,10 +237,12 @@ class WristSensor(StepBlock):
         self._applied = self.DeclareAbstractInputPort(
             "applied_spatial_force", Value([ExternallyAppliedSpatialForce()])
         )
+        self._touching = self.signal_in("touching", Load)
         self.DeclareDiscreteState(flat(_START))
         reads = {
             self._state.ticket(),
             self._applied.ticket(),
+            self._touching.ticket(),
             self.time_ticket(),
             self.xd_ticket(),
         }
@@ -252,6 +256,8 @@ class WristSensor(StepBlock):
         load = np.zeros(6)
         if self._applied.HasValue(context):
             load = self._applied_load(context, state)
+        if self._touching.HasValue(context):
+            load = load + self._touching.Eval(context)
         stiffness = np.array([self._stiffness * self._factor(time)])
         old = context.get_discrete_state_vector().value()
         return self._sense(

@@ -33,3 +33,4 @@ class Stop(Code):
     WALL_LOADED = 8, "force on the wall over its limit"
     SENSOR_LOST = 9, "wrist sensor lost"
     PROBING = 10, "probing the wall"
+    TOUCHED = 11, "touched by a tool"

@@ -318,6 +318,11 @@ def _update(
     code, moves = float(reason.value), reason == Stop.MOVING
     if moves and permission.speed_scale <= 0.0:
         code, moves = permission.code, False
+    blind = reason == Stop.WAITING or reason == Stop.NOT_A_NUMBER
+    if permission.code == float(Stop.TOUCHED.value) and not blind:
+        # Whatever else it would wait for: it gives way, from where it is pushed to.
+        code, moves, escapes = permission.code, True, True
+        p = plus(robot.tip, limited(sub(p, robot.tip), params.follow_error))
     if escapes and not moves and evades(reason, permission):
         # It stands where it was told to go, not where a tool comes.
         moves = True

@@ -45,6 +45,7 @@ DIAGRAMS: dict[str, list[str]] = {
     "gauze_hunted": [],
     "gauze_dynamic_real": [],
     "gauze_press": [],
+    "gauze_touched": [],
     "pwe_arc": ["faults=[{kind: force_stuck}]"],
     "nav_one_static": [],
     "nav_crowd": [],

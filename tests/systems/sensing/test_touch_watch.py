@@ -1,0 +1,90 @@
+"""Tests of the touch watch: a push is told from the wall by where it acts."""
+
+import numpy as np
+import pytest
+
+from systems.common.geometry import cross
+from systems.common.signal import example, flat, view
+from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
+from systems.common.stops import Stop
+from systems.sensing.touch_watch import Touched, TouchWatch, TouchWatchParams
+
+LENGTH, DEPTH = 0.4, 0.28
+SHAFT = ShaftMotion(
+    (0.0, 0.0, DEPTH), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+)
+FOUND = example(Fulcrum)._replace(p=(0.0, 0.0, 0.0), sigma_ln_stiffness=0.05)
+PERIOD = TouchWatchParams().period
+
+
+def after(rows, probing=False):
+    """The outputs after readings: pairs of a force in N and where it acts below S."""
+    dut = TouchWatch(TouchWatchParams(length=LENGTH))
+    context = dut.CreateDefaultContext()
+    code = float(Stop.PROBING) if probing else 0.0
+    for name, value in (
+        ("shaft", SHAFT),
+        ("estimate", FOUND),
+        ("permission", Permission(1.0, code)),
+    ):
+        dut.GetInputPort(name).FixValue(context, flat(value))
+    rng, told = np.random.default_rng(2), []
+    for force, below in rows:
+        f = (force, 0.0, 0.0)
+        m = np.multiply(below, cross(SHAFT.u, f))
+        noise = rng.normal(size=6) * np.repeat([0.05, 0.005], 3)
+        read = np.array([*f, *m, 1.0])
+        read[:6] += noise
+        for name in ("wrench", "believed"):
+            dut.GetInputPort(name).FixValue(context, read)
+        out = [dut.GetOutputPort(n).Eval(context) for n in ("touch", "told", "wall")]
+        told.append([out[0].copy(), out[1].copy(), out[2].copy()])
+        update = dut.EvalUniquePeriodicDiscreteUpdate(context)
+        context.get_mutable_discrete_state().SetFrom(update)
+    return told
+
+
+CALM = [(0.0, DEPTH)] * 120
+
+
+def test_a_push_is_found_with_its_size_and_place():
+    *_, (touch, told, wall) = after(CALM + [(1.5, DEPTH + 0.08)] * 60)
+    said = view(Touched, touch)
+    assert said.touched == 1.0
+    assert said.f[0] == pytest.approx(1.5, abs=0.1)
+    assert said.share == pytest.approx(0.08 / (LENGTH - DEPTH), abs=0.1)
+    assert view(Wrench, told).valid == 0.0  # the estimator predicts
+    assert np.linalg.norm(view(Wrench, wall).f) < 0.3
+
+
+def test_it_is_found_within_a_tenth_of_a_second_and_over_as_soon():
+    rows = after(CALM + [(1.5, DEPTH + 0.08)] * 60 + CALM)
+    touched = np.array([view(Touched, row[0]).touched for row in rows])
+    first = int(touched.argmax())
+    assert len(CALM) < first < len(CALM) + 0.1 / PERIOD
+    assert touched[first : len(CALM) + 60].all()
+    assert not touched[len(CALM) + 60 + int(0.3 / PERIOD) :].any()
+
+
+def test_a_wall_that_jumps_is_no_push_and_the_estimator_is_told_of_it():
+    rows = after(CALM + [(3.0, DEPTH)] * 60)
+    assert not any(view(Touched, row[0]).touched for row in rows)
+    assert view(Wrench, rows[-1][1]).f[0] > 2.5
+    waited = [view(Wrench, row[1]).valid for row in rows[len(CALM) :]].index(1.0)
+    assert waited * PERIOD < 0.1
+
+
+def test_noise_alone_is_no_push():
+    rows = after([(0.0, DEPTH)] * 3000)
+    assert not any(view(Touched, row[0]).touched for row in rows)
+
+
+def test_next_to_the_trocar_it_is_the_walls():
+    rows = after(CALM + [(1.5, DEPTH + 0.005)] * 60)
+    assert not any(view(Touched, row[0]).touched for row in rows)
+
+
+def test_while_the_wrist_probes_nothing_is_known():
+    rows = after(CALM + [(1.5, DEPTH + 0.08)] * 60, probing=True)
+    assert not any(view(Touched, row[0]).touched for row in rows)
+    assert all(view(Wrench, row[1]).valid for row in rows)
