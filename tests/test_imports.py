@@ -107,6 +107,7 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.learning.environments",
         "diagrams.live.command",
         "diagrams.live.session",
+        "diagrams.resection.operate",  # who chooses while it runs
     }
     assert importers(arrows, "diagrams.studies") == {
         "diagrams.campaigns.acts",
@@ -136,6 +137,8 @@ def test_what_is_done_before_a_run_is_done_nowhere_else(arrows):
         "diagrams.keyhole.operation",
         "diagrams.resection.console",
         "diagrams.resection.diagram",  # the case's type
+        "diagrams.resection.online",
+        "diagrams.resection.operate",
         "diagrams.resection.planned",
         "diagrams.resection.rounds",
         "diagrams.resection.study",

@@ -184,7 +184,7 @@ class OnlinePlayer(Block):
 
     def _profile(self, stretch: Stretch) -> Profile:
         """How a stretch is played, of a clock on which it begins after the dwell."""
-        page, first, last = map(int, stretch[:3])
+        page, first, last = map(int, (stretch.page, stretch.first, stretch.last))
         if (page, first, last) not in self._profiles:
             part, plan = slice(first, last + 1), self._pages[page]
             found = profile(plan.x[part], self._params, plan.waits[part])

@@ -81,23 +81,15 @@ class ProcedureChooser(Block):
     Port ``accepted`` emits the `Accepted` page.
     """
 
-    def __init__(
-        self,
-        book: Book | None = None,
-        period: float = 0.02,
-        choose: Callable[[int], Iterable[str]] | None = None,
-    ) -> None:
+    def __init__(self, book: Book | None = None, period: float = 0.02) -> None:
         """Makes the block.
 
         Args:
             book: Of lines and plans; an empty one if None.
             period: In s.
-            choose: Says lines of its own whenever no step is left that the robot has
-                not taken; it is told the last posture taken.
         """
         super().__init__()
         self.book = book or Book(standing(4e-3))
-        self._choose = choose
         self._taken = self.signal_in("taken", Taken)
         self._waiting = self.signal_in("waiting", Waiting)
         self.state_out("accepted", Accepted, np.zeros(1))
@@ -115,10 +107,4 @@ class ProcedureChooser(Block):
         for line in book.hear(time, last):
             book.say(time, line)
         number = book.read(max(book.due(time), int(page)), last, time)
-        plan = book.pages[number]
-        idle = plan.after(last) is None and not plan.is_over and not plan.is_stopped
-        if self._choose and idle and number == len(book.lines):
-            for line in self._choose(last):
-                book.say(time, line)
-            number = book.read(book.due(time), last, time)
         return [float(number)]
