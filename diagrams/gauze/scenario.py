@@ -229,6 +229,9 @@ def contact_rules(scenario: GauzeScenario) -> Rules:
     rests = scenario.wall_motion.still and not scenario.abdomen.turning_stiffness
     told = "False where wall or trocar load the shaft: it is taken for a push"
     yield not gives_way or rests, "touch_yield.active", told
+    bends = scenario.instrument.bending_stiffness or scenario.shaft_bend.active
+    told = "False with a shaft that bends: the two have not been tried together"
+    yield not (scenario.held_tools.active and bends), "held_tools.active", told
     told = "False with press.active, whose own touch it would take for a push"
     yield not (gives_way and scenario.press.active), "touch_yield.active", told
     for tool in scenario.obstacles:

@@ -42,6 +42,7 @@ def test_who_does_not_give_way_is_pushed_harder():
         ("held_tools.contact_stiffness=5e3", "expected >= 1"),
         ("wall_motion.breathing=[0.003, 0, 0]", "False where wall or trocar load"),
         ("abdomen.turning_stiffness=0.3", "False where wall or trocar load"),
+        ("instrument.bending_stiffness=5.3", "False with a shaft that bends"),
     ],
 )
 def test_what_cannot_be_is_refused(change, said):
