@@ -252,7 +252,7 @@ def add_wrist(
         told_tool = told_instrument(sensor, scenario.instrument)
         reckoned = replace(bend, period=sensor.period)
         systems["shaft_bend"] = ShaftBend(reckoned, told_tool)
-        systems["straight_tool"] = StraightTool()
+        systems["straight_tool"] = StraightTool(sensor.period)
         new += ["shaft_bend", "straight_tool"]
     for name in new:
         builder.AddNamedSystem(name, systems[name])

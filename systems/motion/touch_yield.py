@@ -34,6 +34,7 @@ from systems.common.signals import (
     RobotTool,
     Velocity,
     finite_guide,
+    finite_permission,
     finite_tool,
 )
 from systems.common.step_block import StepBlock
@@ -88,23 +89,27 @@ def give_way(
     permission: Permission,
     touch: Touched,
 ) -> tuple[Yielding, Velocity, Permission]:
-    """One step: what is remembered, the guide point's velocity, and the permission."""
+    """One step: what is remembered, the guide point's velocity, and the permission.
+
+    It stands while something of what it is told is no number.
+    """
+    still = (0.0, 0.0, 0.0)
     sound = finite_touch(touch) and finite_guide(guide) and finite_tool(robot)
+    if not (sound and finite_velocity(v_safe) and finite_permission(permission)):
+        return Yielding(still, old.left), Velocity(still), permission
     s = max(guide.s, c.least_guide)
-    pushed = sound and touch.touched > 0.5
+    pushed = touch.touched > 0.5
     left = c.wait if pushed else max(old.left - c.period, 0.0)
     if left <= 0.0:
-        return Yielding((0.0, 0.0, 0.0), 0.0), v_safe, permission
-    wanted = (0.0, 0.0, 0.0)
+        return Yielding(still, 0.0), v_safe, permission
+    wanted = still
     if pushed:
         over = max(0.0, 1.0 - c.borne / max(norm(touch.f), 1e-9))
         rate = c.admittance * over / max(touch.share, c.least_share)
         wanted = limited(scaled(rate, touch.f), c.speed)
     v = plus(old.v, limited(sub(wanted, old.v), c.acceleration * c.period))
-    v_R = Velocity(scaled(s, v))
-    if sound and finite_velocity(v_safe):
-        u = unit(sub(robot.tip, robot.fulcrum))
-        v_R = Velocity(along(v_R.v, min(0.0, dot(v_safe.v, u)), u))
+    u = unit(sub(robot.tip, robot.fulcrum))
+    v_R = Velocity(along(scaled(s, v), min(0.0, dot(v_safe.v, u)), u))
     return Yielding(v, left), v_R, Permission(0.0, _TOUCHED)
 
 

@@ -202,10 +202,12 @@ COMMANDS = {
     "ResectionIk": {"posture": HELD},
     "SnakeTask": {"target": HELD},
     "StatechartPlanner": {"v_R": RATE},
+    "StraightTool": {"tool": TOOL},
     "SwitchingPlanner": {"v_R": RATE},
     "TissuePress": {"v_R": RATE},
     "ToolBypass": {"v1": RATE},
     "ToolNavigation": {"tool": TOOL},
+    "TouchYield": {"v_R": RATE},
     "TrackedTool": {"tip_velocity": RATE},
     "TubeTask": {"tool": TOOL},
     "UnicycleControl": {"command": RATE},
@@ -226,6 +228,7 @@ OBSERVE = {
     *("NavigationMonitor", "TissueForce", "WallWrench"),
     *("GuidedDisc", "SensorZeroing", "TensionEstimator", "ToolTracker"),
     *("BaseSensor", "ContactWatch", "ProcedureChooser"),
+    *("ShaftBend", "TouchWatch"),
 }
 """Blocks that command nothing."""
 LEAD = {"Outside", "ProcedurePlayer", "TipReference"}

@@ -61,7 +61,7 @@ def test_a_silent_sensor_leaves_the_bend_as_it_was_and_says_so():
 def test_the_arm_is_sent_where_the_bent_tip_is_right():
     bend = Bend((1e-3, -2e-3, 0.0), (0.0, 4e-3, 1e-3))
     wanted = ToolMotion((0.1, 0.0, -0.1), tuple(U), STILL, STILL, 1.0)
-    (told,) = straightened(wanted, bend)
+    told = straightened(wanted, bend)
     np.testing.assert_allclose(np.add(told.tip, bend.tip), wanted.tip)
     turned = np.add(told.u, np.cross(bend.turn, told.u))
     np.testing.assert_allclose(turned, U, atol=5e-5)
