@@ -7,7 +7,7 @@ pressed; the scenario that plays them back is the run that was seen.
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter, sleep
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from pydrake.geometry import MeshcatVisualizer, MeshcatVisualizerParams, Role
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.common.live import Figure, Live
+from diagrams.common.pace import Pace
 from diagrams.common.progress import silent
 from diagrams.common.replay import QUERY_PORT, dress
 from diagrams.common.run import start
@@ -30,8 +31,6 @@ DRAWN = 1.0 / 30.0
 """Between two pictures, and what other programs are told [s]."""
 READ = 0.1
 """Between two updates of the figures [s]."""
-BEHIND = 0.05
-"""By which a session may lag and catch up; what it is later than that is lost [s]."""
 NEVER = 1e5
 """When a fault begins that nobody has asked for [s]."""
 USUAL = ("pause", "reset", "another seed", "end and save")
@@ -290,16 +289,14 @@ class Session:
             duration: Simulated seconds at the most.
             speed: Simulated seconds a second.
         """
-        due = perf_counter()
+        pace, due = Pace(speed), 0.0  # time stands while it is paused
+        pace.late(due)
         while self.time < duration - 1e-9 and not self.is_over:
             self.frame()
-            due += self._live.frame / speed
-            late = perf_counter() - due
+            due += self._live.frame
+            late = pace.late(due)
             self.lag.append(max(0.0, late))
-            if late < 0.0:
-                sleep(-late)
-            else:  # all of it would be made up for in a rush
-                due += max(0.0, late - BEHIND)
+            sleep(max(-late, 0.0))
 
     def save(self, folder: Path) -> Any:
         """Writes the tape of all that was guided.

@@ -12,11 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Thread
-from time import monotonic, perf_counter, sleep
+from time import monotonic, sleep
 from typing import Any
 
 import yaml
 
+from diagrams.common.pace import Pace
 from diagrams.common.progress import progress_bar
 from diagrams.common.replay import start_meshcat
 from diagrams.common.run import Run, prepare, run_scenario
@@ -27,29 +28,6 @@ from diagrams.resection.operation import Operation
 from diagrams.resection.scenario import ResectionScenario
 from systems.common.archive import beside, whole
 from systems.resection.wires.online_player import Wait
-
-LATE = 0.05
-"""By which the robot may lag behind the clock and catch up, in s."""
-
-
-class Pace:
-    """Keeps the robot to the clock on the wall."""
-
-    def __init__(self, speed: float) -> None:
-        """Makes a pace of so many simulated seconds a second; 0 for no pace."""
-        self._speed, self._begin, self._last = speed, 0.0, -1.0
-
-    def early(self, time: float) -> float:
-        """How much too early a simulated time in s is, in s of the clock."""
-        if self._speed == 0.0:
-            return 0.0
-        now = perf_counter()
-        if time < self._last or self._last < 0.0:  # it begins, perhaps again
-            self._begin = now - time / self._speed
-        late = now - (self._begin + time / self._speed)
-        self._begin += max(late - LATE, 0.0)
-        self._last = time
-        return max(-late, 0.0)
 
 
 class Listener:
@@ -70,13 +48,16 @@ class Listener:
             self._listens.join()
 
     def _listen(self, lines: Iterable[str]) -> None:
+        ends = False
         for line in lines:
             words = line.split()
             if words[:1] in (["quit"], ["exit"]):
                 break
+            ends = ends or words == ["end"]
             if words:
                 self._heard.put(line.strip())
-        self._heard.put("end")
+        if not ends:
+            self._heard.put("end")
 
     def hear(self, time: float, taken: int) -> list[str]:
         """Waits until it is time, and returns what has been said."""

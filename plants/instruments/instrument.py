@@ -30,13 +30,15 @@ from pydrake.multibody.tree import (
 )
 
 from plants.common.looks import DARK, GAUZE, STEEL, draw
-from systems.common.parameter import check, parameter
+from systems.common.parameter import Rules, check, parameter
 
 GAUZE_RADIUS = 0.0045
 """Of the gauze in the jaw, the longest, m."""
 _LOSS = 2e-4
 """Damping of the bend over its stiffness, in s: 2 % of critical; assumed."""
 _KNUCKLE = 5e-4  # of the body between the bend's two axes, kg
+SOFTEST = 2.0
+"""EI of a shaft that bends, at the least: nothing softer was tried, N m^2."""
 DRY_GAUZE = 0.002
 """Its mass, kg; wet it is 0.02."""
 
@@ -57,10 +59,14 @@ class InstrumentParams:
     gauze_mass: float = parameter(
         0.0, "of the gauze at the tip: dry 0.002, wet 0.02", "kg", least=0, most=0.1
     )
-    # Below it the joint's own swing is slower than the wrist is sampled.
     bending_stiffness: float = parameter(
-        0.0, "EI of the shaft, 2 to 100; rigid if 0", "N m^2", least=0, most=1e3
+        0.0, "EI of the shaft, 2 to 100; rigid if 0", "N m^2", least=0, most=100
     )
+
+    def rules(self) -> Rules:
+        """A softer shaft's own swing is slower than the wrist is sampled."""
+        stiff = self.bending_stiffness == 0.0 or self.bending_stiffness >= SOFTEST
+        yield stiff, "bending_stiffness", f"0 or >= {SOFTEST:g} N m^2"
 
     @property
     def mass(self) -> float:
@@ -233,13 +239,14 @@ def _inertia(params: InstrumentParams) -> SpatialInertia:
 
     Where the shaft bends, of what is before the bend.
     """
-    radius, end, mass = 0.5 * params.diameter, params.length, params.shaft_mass
+    radius = 0.5 * params.diameter
     total = _rod(params.mount_mass, 0.018, 0.0, params.mount_length)
     if params.bending_stiffness:
         end = params.bend_joint
-        total += _rod(mass * end / params.length, radius, 0.0, end)
+        mass = params.shaft_mass * end / params.length
+        total += _rod(mass, radius, 0.0, end)
         return total
-    total += _rod(mass, radius, 0.0, end)
+    total += _rod(params.shaft_mass, radius, 0.0, params.length)
     return _with_gauze(total, params)
 
 

@@ -296,8 +296,8 @@ class HeldTools(Block):
         """Of each tool f, p and grip, and then the moment and force on the robot."""
         results = self._results.Eval(context)
         forces = np.zeros((len(self._bodies), 7))
-        for k, row in enumerate(forces):
-            row[3:6] = self._shaft(k, context)[:3]
+        shafts = [read_shaft(self._shaft(k, context)) for k in range(len(forces))]
+        forces[:, 3:6] = [shaft.tip for shaft in shafts]
         load = np.zeros(6)
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
@@ -309,10 +309,10 @@ class HeldTools(Block):
             forces[k, 3:6] = p
             load[:3] -= np.cross(p, f)
             load[3:] -= f
-        for k, row in enumerate(forces):
-            u = vector(self._shaft(k, context)[3:])
+        lever = self._params.lever
+        for p_WG, shaft, row in zip(self._p_WG, shafts, forces, strict=True):
             f, p = vector(row[:3]), vector(row[3:6])
-            row[6] = in_hand(self._p_WG[k], self._params.lever, f, p, u)
+            row[6] = in_hand(p_WG, lever, f, p, shaft.u)
         return np.concatenate([forces.ravel(), load])
 
     def _calc_hand_force(self, context: Any) -> np.ndarray:

@@ -38,8 +38,8 @@ from systems.common.parameter import check, parameter
 from systems.common.signal import finiteness
 from systems.common.signals import Bend, ShaftMotion, Wrench
 from systems.common.step_block import StepBlock
+from systems.sensing.wrench_kernel import GRAVITY
 
-_GRAVITY = 9.81
 _STILL = (0.0, 0.0, 0.0)
 finite_shaft, finite_wrench = finiteness(ShaftMotion), finiteness(Wrench)
 
@@ -163,7 +163,7 @@ class ShaftBend(StepBlock):
             joint=tool.bend_joint,
             length=float(tool.length),
             centre=centre,
-            weight=_GRAVITY * mass,
+            weight=GRAVITY * mass,
             stiffness=share * tool.bend_stiffness,
             smooth=float(params.smooth),
             period=float(params.period),

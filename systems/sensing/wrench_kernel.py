@@ -8,7 +8,8 @@ from systems.common.geometry import Pose, along, cross, outwards, plus, scaled, 
 from systems.common.signal import Field, Vector, finiteness
 from systems.common.signals import ShaftMotion, Wrench
 
-_GRAVITY = 9.81
+GRAVITY = 9.81
+"""In m/s^2."""
 SILENCE = Wrench((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 """The wrench of a sensor that says nothing."""
 _finite = finiteness(Wrench)
@@ -69,7 +70,7 @@ def wall_wrench(
     transverse = params.inertia + load.mass * load.at * load.at
     u = mount.z
     ddu = plus(cross(felt.alpha, u), cross(mount.w, cross(mount.w, u)))
-    up = plus(felt.a, (0.0, 0.0, _GRAVITY))  # a - g
+    up = plus(felt.a, (0.0, 0.0, GRAVITY))  # a - g
     f = scaled(mass, along(up, centre, ddu))
     m = cross(u, along(scaled(transverse, ddu), mass * centre, up))
     if params.sleeve_mass > 0.0:

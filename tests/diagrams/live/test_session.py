@@ -181,7 +181,7 @@ def test_a_late_frame_is_made_up_for_but_not_a_long_one(page, monkeypatch, late,
         now[0] += late + frame if session.time == pytest.approx(2 * frame) else 0.0
 
     monkeypatch.setattr(session, "frame", step)
-    monkeypatch.setattr("diagrams.live.session.perf_counter", lambda: now[0])
+    monkeypatch.setattr("diagrams.common.pace.perf_counter", lambda: now[0])
     monkeypatch.setattr(
         "diagrams.live.session.sleep", lambda time: now.__setitem__(0, now[0] + time)
     )

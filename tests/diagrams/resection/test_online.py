@@ -11,7 +11,7 @@ from diagrams.common.run import prepare, simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.resection.console import procedure_from
 from diagrams.resection.online import answered, load_choices, save_choices
-from diagrams.resection.operate import OnlineDesk, listened, operate
+from diagrams.resection.operate import Listener, OnlineDesk, listened, operate
 from diagrams.studies import load_scenario
 from plants.tissue.execution import load_execution
 from systems.common.archive import beside
@@ -123,6 +123,11 @@ def test_a_run_cut_off_goes_on_with_the_lines_that_are_left(whole, tmp_path):
     assert done.posture == len(plan) - 1
     for key in ("execution_time", "path_length", "resected_fraction"):
         assert rest.metrics[key] == pytest.approx(planned.metrics[key], rel=0.02), key
+
+
+def test_an_end_is_said_once():
+    for said, heard in ((["check", "end"], ["check", "end"]), (["x"], ["x", "end"])):
+        assert Listener(said, 0.0).hear(0.0, 0) == heard
 
 
 def test_what_was_typed_plays_back(tmp_path):

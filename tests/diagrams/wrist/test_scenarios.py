@@ -129,6 +129,7 @@ def test_same_seed_same_figures():
         ("fulcrum_estimator.stiffness=-1.0", "fulcrum_estimator.stiffness=-1.0 N/m"),
         ("tool_wrench.period=0.01", "joints.period=.* shared by both"),
         ("tool_wrench.frame=7", "expected a text"),
+        ("instrument.bending_stiffness=0.5", "stiffness=0.5 N m.2: expected 0 or >= 2"),
         ("compare=[pew]", "compare=.'pew'.: expected one of pwe"),
         ("wall_motion.wave=square", "wave='square': expected one of sine, ventilator"),
     ],
