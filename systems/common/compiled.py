@@ -26,6 +26,7 @@ from typing import Any
 import numba
 from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
 from numba.core.event import Listener, install_listener
+from numba.core.registry import CPUDispatcher
 import numpy as np
 
 type Numbers = Sequence[float] | np.ndarray
@@ -38,13 +39,37 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     Division by zero gives an infinity or NaN, as in numpy, and the blocks test for
     them; hence no `fastmath`, which would take them for impossible.
     """
+    result = _dispatcher(function, "InTree", "UserWide")
+    result.__class__ = _Outer
+    result.inner = _dispatcher(
+        function, "InnerInTree", "InnerUserWide", no_cpython_wrapper=True
+    )
+    return result
+
+
+class _Outer(CPUDispatcher):
+    """A compiled function as Python calls it; others that call it are given `inner`.
+
+    Taking arguments from Python is a fifth of what there is to compile, and most
+    functions are called by compiled ones alone.
+    """
+
+    inner: Any
+
+    @property
+    def _numba_type_(self) -> Any:
+        return numba.types.Dispatcher(self.inner)
+
+
+def _dispatcher(function: Any, *locators: str, **options: Any) -> Any:
+    """Numba's, with a cache on disk where there is a place."""
     before = numba.config.CACHE_LOCATOR_CLASSES
-    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.InTree,{__name__}.UserWide"
-    filed = Path(function.__code__.co_filename).is_file()  # not in a notebook
-    compile_: Any = numba.njit(error_model="numpy", no_cfunc_wrapper=True)
+    names = ",".join(f"{__name__}.{locator}" for locator in locators)
+    numba.config.CACHE_LOCATOR_CLASSES = names
+    compile_ = numba.njit(error_model="numpy", no_cfunc_wrapper=True, **options)
     result = compile_(function)
     try:
-        if filed:
+        if Path(function.__code__.co_filename).is_file():  # not in a notebook
             result.enable_caching()
     except RuntimeError:  # no place can be written to: each process compiles anew
         result = compile_(function)
@@ -200,6 +225,9 @@ def _stamp(function: FunctionType) -> str:
 class _Stamped:
     """A place for a function's compiled code that notices a change in any callee."""
 
+    mark = ""
+    """Tells apart what Python calls and what has no way in from it."""
+
     def __init__(self, *function_and_file: Any) -> None:
         super().__init__(*function_and_file)
         self._function = function_and_file[0]
@@ -213,7 +241,7 @@ class _Stamped:
         code = marshal.dumps(self._function.__code__, 2)
         origins = [(file, *sorted(words)) for file, words in _origins(self._function)]
         text = repr(sorted(origins)).encode()
-        return hashlib.sha256(code + text).hexdigest()[:12]
+        return hashlib.sha256(code + text).hexdigest()[:12] + self.mark
 
 
 class InTree(_Stamped, InTreeCacheLocator):
@@ -222,6 +250,18 @@ class InTree(_Stamped, InTreeCacheLocator):
 
 class UserWide(_Stamped, UserWideCacheLocator):
     """One in the user's cache folder, for an installation that is read-only."""
+
+
+class InnerInTree(InTree):
+    """A cache beside the source, of what compiled functions call."""
+
+    mark = "-inner"
+
+
+class InnerUserWide(UserWide):
+    """The same in the user's cache folder."""
+
+    mark = "-inner"
 
 
 @cache

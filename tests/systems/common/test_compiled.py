@@ -52,6 +52,21 @@ def test_division_by_zero_gives_infinity():
     assert inverse(0.0) == np.inf
 
 
+def test_what_only_compiled_functions_call_has_no_way_in_from_python():
+    @compiled
+    def double(x):
+        return 2.0 * x
+
+    @compiled
+    def quadruple(x):
+        return double(double(x))
+
+    assert quadruple(1.0) == 4.0
+    assert double.inner.signatures and not double.signatures
+    assert double(3.0) == 6.0
+    assert double.signatures == double.inner.signatures
+
+
 def test_where_nothing_can_be_written_it_is_compiled_all_the_same(monkeypatch):
     def refuse(locator):
         raise OSError("read-only")
