@@ -11,7 +11,7 @@ import numpy as np
 
 from plants.snake.posture import module_angles
 from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, along, dot
+from systems.common.geometry import Vector, along, dot, xyz
 
 REACHED = 0
 BEND = 1  # outside the reach of modules 1 and 2 whatever the translation
@@ -48,7 +48,7 @@ def half_bend(w: float, kappa: float, t_max: float) -> float:
 
 
 @compiled
-def _middle_axis(k: float, x: float, y: float, n: Any, t_max: float) -> Any:
+def _middle_axis(k: float, x: float, y: float, n: Vector, t_max: float) -> Any:
     """Axis v for a given k = cos(beta2), its error v . n - (2 k^2 - 1), and t1.
 
     (x, y) is the lateral part of (p_WI - 2h n)/(2h).
@@ -64,7 +64,7 @@ def _middle_axis(k: float, x: float, y: float, n: Any, t_max: float) -> Any:
 
 
 @compiled
-def _before(alpha: float, beta: float, n: Numbers) -> Vector:
+def _before(alpha: float, beta: float, n: Vector) -> Vector:
     """An axis of W as the end of the module (alpha, beta) has it."""
     ca, sa = math.cos(alpha), math.sin(alpha)
     c2, s2 = math.cos(2 * beta), math.sin(2 * beta)
@@ -74,7 +74,7 @@ def _before(alpha: float, beta: float, n: Numbers) -> Vector:
 
 
 @compiled
-def _turn_back(alpha: float, beta: float, n: Numbers) -> tuple[float, float]:
+def _turn_back(alpha: float, beta: float, n: Vector) -> tuple[float, float]:
     """Azimuth and bend, per ball, that take a module's end axis to n.
 
     n is expressed in W; (alpha, beta) is the one module before.
@@ -95,7 +95,9 @@ def _stroke(travel: Any, q: Any) -> int:
 
 
 @compiled
-def _positioning(p: Any, n: Any, h: float, bend: float, travel: Any, q: Any) -> int:
+def _positioning(
+    p: Vector, n: Vector, h: float, bend: float, travel: Any, q: Any
+) -> int:
     """Writes (s, alpha1, beta1, alpha2, beta2) to q; returns the status."""
     t_max = math.tan((bend + SLACK) / 2)
     x, y = p[0] / (2 * h) - n[0], p[1] / (2 * h) - n[1]
@@ -158,7 +160,7 @@ def _as_posture(modules: int, x: Any) -> None:
 
 @compiled
 def solve_positioning(
-    p: Numbers, n: Numbers, h: float, bend: float, travel: Numbers, x: Any
+    p: Vector, n: Vector, h: float, bend: float, travel: Numbers, x: Any
 ) -> int:
     """Puts O2 at p_WI, its axis along n_WI: (s, a1, b1, a2, b2) into x; the status.
 
@@ -172,9 +174,9 @@ def solve_positioning(
 
 @compiled
 def solve_tool(
-    p: Numbers,
-    n: Numbers,
-    m: Numbers,
+    p: Vector,
+    n: Vector,
+    m: Vector,
     h: float,
     tool: float,
     bend: float,
@@ -203,7 +205,7 @@ def solve_positionings(
 ) -> None:
     """As `solve_positioning` for many poses (N, 3), postures (N, 5), statuses (N,)."""
     for i in range(len(p)):
-        status[i] = solve_positioning(p[i], n[i], h, bend, travel, x[i])
+        status[i] = solve_positioning(xyz(p[i], 0), xyz(n[i], 0), h, bend, travel, x[i])
 
 
 @compiled
@@ -220,4 +222,5 @@ def solve_tools(
 ) -> None:
     """As `solve_tool` for many poses (N, 3), postures (N, 7), statuses (N,)."""
     for i in range(len(p)):
-        status[i] = solve_tool(p[i], n[i], m[i], h, tool, bend, travel, x[i])
+        at, u, v = xyz(p[i], 0), xyz(n[i], 0), xyz(m[i], 0)
+        status[i] = solve_tool(at, u, v, h, tool, bend, travel, x[i])

@@ -29,6 +29,7 @@ from plants.snake.inverse_kernels import (
 )
 from plants.snake.parameters import SnakeParams
 from plants.snake.posture import Array
+from systems.common.signal import vector
 
 
 def vectors(name: str, value: ArrayLike, unit: bool = False) -> Array:
@@ -156,5 +157,5 @@ def tool_posture(target: ArrayLike, params: SnakeParams) -> tuple[list[float], i
     x = np.empty(7)
     h, tool, bend = params.half_pitch, params.tool_offset, params.max_bend
     travel = (params.travel[0], params.travel[1])
-    status = solve_tool(p, n, m, h, tool, bend, travel, x)
+    status = solve_tool(vector(p), vector(n), vector(m), h, tool, bend, travel, x)
     return x.tolist(), status

@@ -28,7 +28,7 @@ from plants.tissue.space import (
     voxel_of,
 )
 from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import Vector, along, dot, sub
+from systems.common.geometry import Vector, along, dot, sub, xyz
 from systems.common.signal import vector
 
 OK = 0
@@ -39,6 +39,12 @@ TRAVEL = 4  # the translation beyond its travel
 
 PLATE, SHANK, BALL = 6, 7, 8
 """Parts of the body beyond its links 0 to 5; see `check_body`."""
+
+WHOLE, LAST = np.int64(0), np.int64(4)
+"""First parts of a body to be checked: all, or the last module alone.
+
+They are no literals, for each of which all would be compiled once more.
+"""
 
 CULPRIT = 9
 """Numbers that name what a pose met: part, point, radius, voxel, axis of a plate."""
@@ -180,9 +186,10 @@ def check_links(s: Space, b: Body, c: Any, first: int, why: Any) -> int:
             at = body_solid(s, p, b.body)
             if at != FREE:
                 return _blame(why, link, p, b.body, at)
-    at = body_solid(s, c[5], b.body)
+    p = xyz(c[5], 0)
+    at = body_solid(s, p, b.body)
     if at != FREE:
-        return _blame(why, 5, c[5], b.body, at)
+        return _blame(why, 5, p, b.body, at)
     return OK
 
 
@@ -260,7 +267,7 @@ def could_fit(s: Space, b: Body, c: Any) -> bool:
             at = voxel_of(s, along(c[link], n / 4, sub(c[link + 1], c[link])))
             if at >= 0 and s.inside[at] < least:
                 return False
-    at = voxel_of(s, c[5])
+    at = voxel_of(s, xyz(c[5], 0))
     return at < 0 or s.inside[at] >= least
 
 
@@ -335,10 +342,10 @@ def drive_far(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> Any:
     longest = math.sqrt(longest)
     steps = max(1, math.ceil(EDGE_SHARE * longest / b.step))
     sure, freed, roomed = 0, s.used[0], s.used[1]
-    moving = 4  # the first part of the body that moves: the last module
+    moving = LAST  # the first part of the body that moves
     for r in range(5):
         if x0[r] != x1[r]:
-            moving = 0
+            moving = WHOLE
     roomy = False  # the plate has room all along this stretch
     for n in range(1, steps + 1):
         if n % EDGE_SHARE == 1:
@@ -359,14 +366,15 @@ def drive_far(s: Space, b: Body, x0: Any, x1: Any, time: int, why: Any) -> Any:
         if whole and status == OK:
             status = check_shank(s, b, c0, why)
         if whole and status == OK:
-            at = first_forbidden(s, c0[7], b.radius)
+            p = xyz(c0[7], 0)
+            at = first_forbidden(s, p, b.radius)
             if at != FREE:
-                _blame(why, BALL, c0[7], b.radius, at)
+                _blame(why, BALL, p, b.radius, at)
                 status = TOOL
         if status != OK:
             roll_back(s, freed, roomed)
             return status, sure / steps
         if whole:
-            stamp(s, c0[7], b.frees, time)
+            stamp(s, xyz(c0[7], 0), b.frees, time)
             sure, freed, roomed = n, s.used[0], s.used[1]
     return OK, 1.0

@@ -14,6 +14,7 @@ from plants.snake.signals import REST, BallPosture, Posture
 from plants.snake.snake_body import (
     CULPRIT,
     OK,
+    WHOLE,
     Body,
     between,
     body_of,
@@ -132,10 +133,10 @@ def carve(
     for n in range(1, steps + 1):
         between(x0, x1, n / steps, x)
         place_any(b, x, c)
-        hits += check_body(s, b, c, 0, why) != OK
+        hits += check_body(s, b, c, WHOLE, why) != OK
         first = s.used[0]
         if cutting:
-            stamp(s, c[7], b.radius, time)
+            stamp(s, xyz(c[7], 0), b.radius, time)
         for m in range(first, s.used[0]):
             if labels[s.freed[m]] == TUMOUR:
                 tumour += 1
@@ -147,7 +148,8 @@ def carve(
                 for part in range(4):
                     q = along(c[link], part / 4, sub(c[link + 1], c[link]))
                     nearest = min(nearest, interpolated(s, critical, q) - b.body)
-            nearest = min(nearest, interpolated(s, critical, c[7]) - b.radius)
+            tool = interpolated(s, critical, xyz(c[7], 0))
+            nearest = min(nearest, tool - b.radius)
     return tumour, healthy, hits, nearest, way
 
 

@@ -260,8 +260,7 @@ def body_deviation(
     a, b, q = np.empty((POINTS, 3)), np.empty((POINTS, 3)), np.empty(7)
     corners(x, h, tool, a)
     p, n, m = seen_from(target_of(x, h, tool), E, C)
-    axes = np.array(p), np.array(n), np.array(m)
-    if solve_tool(*axes, h, tool, bend, (-1.0, 1.0), q) != REACHED:
+    if solve_tool(p, n, m, h, tool, bend, (-1.0, 1.0), q) != REACHED:
         return FAR
     corners(q, h, tool, b)
     most, before = 0.0, (0.0, 0.0, 0.0)

@@ -13,6 +13,7 @@ from scipy import ndimage
 from plants.snake.snake_body import BALL
 from plants.tissue.labels import BRAIN, CRITICAL, TUMOUR
 from plants.tissue.space import SOLID
+from systems.common.signal import vector
 from systems.resection.planning.feasibility import (
     IN_BRAIN,
     LIMIT,
@@ -107,7 +108,7 @@ def growing_map(
         volume.forget_journals()
         session.make_room()
         s, tree, why = volume.space(), session.tree, session.why
-        nearest_nodes(tree, p, found, far)
+        nearest_nodes(tree, vector(p), found, far)
         reason = LIMIT
         for node, turn in product(found[found >= 0], TURNS):
             if not straightened(body, tree.x[node], p, turn, x):

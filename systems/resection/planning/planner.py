@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from plants.tissue.space import SOLID, as_bits
 from systems.common.parameter import Rules, check, parameter
+from systems.common.signal import vector
 from systems.resection.planning.draws import new_draws
 from systems.resection.planning.entry import PILOT, entry_pass, radius_of
 from systems.resection.planning.procedure import ELEMENTARY, Procedure
@@ -298,7 +299,7 @@ class Planner:
         good: list[tuple[int, Procedure]] = []
         for _ in range(params.candidates):
             p = session.volume.centre_of(int(left[self.rng.integers(len(left))]))
-            nearest_nodes(t, p, found, far)
+            nearest_nodes(t, vector(p), found, far)
             node = int(found[self.rng.integers(NEAR)])
             if node < 0:
                 continue

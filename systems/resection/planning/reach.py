@@ -32,6 +32,7 @@ from systems.common.archive import (
     sensible,
     write_archive,
 )
+from systems.common.signal import vector
 from systems.resection.planning.draws import Draws, new_draws
 from systems.resection.planning.entry import PILOT, entry_pass
 from systems.resection.planning.growth import tilted, tool_posture
@@ -258,12 +259,12 @@ def _reason(
         offset = rng.normal(size=3)
         offset *= body.radius * rng.random() ** (1 / 3) / np.linalg.norm(offset)
         p = points[rng.integers(len(points))] + offset
-        if first_forbidden(s, p, body.radius) != FREE:
+        if first_forbidden(s, vector(p), body.radius) != FREE:
             blame[TOO_NARROW] += 1
             continue
         n = tilted(draws, (0.0, 0.0, 1.0), 0.8)
         m = tilted(draws, n, 0.6)
-        if not tool_posture(body, p, n, m, x):
+        if not tool_posture(body, vector(p), n, m, x):
             blame["beyond the robot's bends"] += 1
             continue
         place(body, x, c)

@@ -25,7 +25,7 @@ from plants.tissue.space import (
     roll_back,
 )
 from systems.common.compiled import compiled
-from systems.common.geometry import norm, sub
+from systems.common.geometry import norm, sub, xyz
 from systems.resection.planning.draws import Draws, normal, uniform
 from systems.resection.planning.tree import (
     DIRECT,
@@ -200,14 +200,14 @@ def _think(
     _within_limits(b, out)
     c, y = np.empty((POINTS, 3)), np.empty(7)
     place(b, out, c)
-    if first_forbidden(s, c[7], b.radius) == FREE:
+    if first_forbidden(s, xyz(c[7], 0), b.radius) == FREE:
         return 1.0
     low, high = 0.0, 1.0
     for _ in range(5):
         share = (low + high) / 2
         between(x, out, share, y)
         place(b, y, c)
-        if first_forbidden(s, c[7], b.radius) == FREE:
+        if first_forbidden(s, xyz(c[7], 0), b.radius) == FREE:
             low = share
         else:
             high = share
@@ -253,8 +253,9 @@ def stroke_on(
         direction(k, x, moves[n], u)
         costs[n] = turning(k, v, u)
         place(b, moves[n], c)
-        gain = count_solid(s, c[7], b.frees, g.whole)
-        gain += WALL_WEIGHT * count_solid(s, c[7], b.frees, g.wall)
+        p = xyz(c[7], 0)
+        gain = count_solid(s, p, b.frees, g.whole)
+        gain += WALL_WEIGHT * count_solid(s, p, b.frees, g.wall)
         promise[n] = gain / (time_of(k, x, moves[n]) + costs[n])
     best, chosen = 0.0, -1
     for _ in range(DRIVEN):

@@ -18,9 +18,17 @@ from plants.snake.kinematics import POINTS, link_axis
 from plants.snake.posture import module_angles
 from plants.snake.snake_body import OK, Body, axis_from_entry, from_entry, place
 from plants.tissue.space import Space, roll_back
-from systems.common.compiled import Numbers, compiled
+from systems.common.compiled import compiled
 from systems.common.geometry import Vector, along, norm, sub, unit, xyz
-from systems.resection.planning.tree import Tree, cut, extend, go_to, here, visit
+from systems.resection.planning.tree import (
+    NOWHERE,
+    Tree,
+    cut,
+    extend,
+    go_to,
+    here,
+    visit,
+)
 
 LIMIT = 5
 """Status of a pose that the inverse kinematics does not reach."""
@@ -30,6 +38,9 @@ RAYS = 128
 
 RINGS = 64
 """Most rings of an elementary volume."""
+
+CLIPPED = np.bool_(False)
+"""What is not rigid. A literal would have all compiled once more, for itself."""
 
 
 @compiled
@@ -88,8 +99,8 @@ def sweep_volume(
     centre = here(t)
     bends = np.zeros(RINGS)
     rings = ring_bends(b, widest, pitch, bends)
-    inner = np.empty(RAYS, np.int32)
-    outer = np.empty(RAYS, np.int32)
+    inner = np.empty(RAYS, np.int64)
+    outer = np.empty(RAYS, np.int64)
     x = np.empty(7)
     inner[0] = centre
     rays = 1
@@ -101,7 +112,7 @@ def sweep_volume(
         count = max(min(math.ceil(2 * math.pi * r / pitch), RAYS), 6)
         alive = 0
         first = int(round(turn / (2 * math.pi) * count)) % count
-        before = -1
+        before = NOWHERE
         for m in range(count):
             j = (first + m) % count
             outer[j] = -1
@@ -110,7 +121,7 @@ def sweep_volume(
             new = -1
             if before >= 0 and before == here(t):
                 new = extend(s, b, t, before, x, why)
-            last = -1
+            last = NOWHERE
             if new < 0:
                 # Out along the ray from the ring within.
                 at = int(math.floor(alpha / (2 * math.pi) * rays + 0.5)) % rays
@@ -157,7 +168,7 @@ def intermediate(b: Body, x: Any) -> tuple[Vector, Vector]:
 
 
 @compiled
-def posture_at(b: Body, p: Numbers, n: Numbers, x: Any) -> int:
+def posture_at(b: Body, p: Vector, n: Vector, x: Any) -> int:
     """The posture with O2 at p, axis n and a straight last module, into x (7,)."""
     q, u = from_entry(b, p), axis_from_entry(b, n)
     status = solve_positioning(q, u, b.h, b.bend, (b.low, b.high), x)
@@ -170,7 +181,7 @@ def sweep_procedure(
     s: Space,
     b: Body,
     t: Tree,
-    n: Any,
+    n: Vector,
     length: float,
     spacing: float,
     widest: float,
@@ -184,7 +195,7 @@ def sweep_procedure(
         s: The space.
         b: The body.
         t: The tree; the robot stands at the first intermediate pose.
-        n: Axis of the procedure, unit (3,).
+        n: Axis of the procedure, of unit length.
         length: How far the intermediate pose moves, in m.
         spacing: Between two elementary volumes, in m.
         widest: Largest bend of the last module in rad.
@@ -259,7 +270,7 @@ def try_procedure(
     gain = -1
     if extend(s, b, t, node, x, why) >= 0:
         _, n = intermediate(b, x)
-        sweep_procedure(s, b, t, n, length, spacing, widest, pitch, False, why)
+        sweep_procedure(s, b, t, n, length, spacing, widest, pitch, CLIPPED, why)
         gain = s.used[0] - freed
     roll_back(s, freed, roomed)
     cut(t, nodes, visits)

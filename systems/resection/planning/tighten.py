@@ -16,7 +16,7 @@ from plants.snake.kinematics import POINTS
 from plants.snake.snake_body import OK, Body, between, drive, place
 from plants.tissue.space import SOLID, Space, in_voxels, roll_back, row_span, span
 from systems.common.compiled import compiled
-from systems.common.geometry import dot, sub
+from systems.common.geometry import dot, sub, xyz
 from systems.resection.planning.session import Session
 from systems.resection.planning.strokes import Pace, direction, time_of, turning
 from systems.resection.planning.tree import Tree, add_node, go_to, here, visit
@@ -49,7 +49,7 @@ def latest(s: Space, b: Body, x: Any, out: Any) -> None:
         for n in range(1, steps + 1):
             between(x[j], x[j + 1], n / steps, y)
             place(b, y, c1)
-            u = in_voxels(s, c1[7])
+            u = in_voxels(s, xyz(c1[7], 0))
             for a in range(*span(u[0], r, s.size[0])):
                 left = r * r - (a - u[0]) ** 2
                 for k in range(*span(u[1], r, s.size[1])):
@@ -137,7 +137,7 @@ def drive_again(
             jump = 1
         if jump:
             at += jump
-            new = node[old[at]]
+            new = np.int64(node[old[at]])
             if drive(s, b, t.x[start], x[at], t.size[1], why) == OK:
                 if new < 0:
                     new = add_node(t, b, start, x[at])
@@ -148,7 +148,7 @@ def drive_again(
         # The way is shut: on from the next posture that can be gone to.
         found = False
         for step in range(1, min(SEARCHED, n - 1 - at) + 1):
-            new = node[old[at + step]]
+            new = np.int64(node[old[at + step]])
             if new >= 0:
                 go_to(s, b, t, new, why)
             elif drive(s, b, t.x[start], x[at + step], t.size[1], why) == OK:

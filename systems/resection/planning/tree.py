@@ -14,8 +14,8 @@ import numpy as np
 from plants.snake.kinematics import POINTS
 from plants.snake.snake_body import OK, Body, drive, place
 from plants.tissue.space import Space, roll_back
-from systems.common.compiled import Numbers, compiled
-from systems.common.geometry import dot, norm, sub
+from systems.common.compiled import compiled
+from systems.common.geometry import Vector, dot, norm, sub
 
 DIRECT = 0.030
 """Longest way of the tool, in m, for which the straight line is tried first."""
@@ -25,6 +25,9 @@ CELL = 2e-3
 """Edge in m of the cells in which nodes are looked up by their tools."""
 
 CELLS = 1 << 14
+
+NOWHERE = np.int64(-1)
+"""No node. Of a type like a node's: with another, all would be compiled twice."""
 
 SHELLS = 6
 """Cells looked through around a point, in each direction, before all nodes are."""
@@ -160,7 +163,7 @@ def cut(t: Tree, nodes: int, visits: int) -> None:
 @compiled
 def here(t: Tree) -> int:
     """The node at which the robot stands."""
-    return t.route[t.size[1] - 1]
+    return np.int64(t.route[t.size[1] - 1])
 
 
 @compiled
@@ -200,8 +203,8 @@ def go_to(s: Space, b: Body, t: Tree, node: int, why: Any) -> None:
         return
     # Up to where both branches meet, then down.
     up, down = start, node
-    back = np.empty(t.depth[node] + 1, np.int32)
-    way = np.empty(t.depth[start] + t.depth[node] + 2, np.int32)
+    back = np.empty(t.depth[node] + 1, np.int64)
+    way = np.empty(t.depth[start] + t.depth[node] + 2, np.int64)
     ups, downs = 0, 0
     way[0] = start
     while up != down:
@@ -254,7 +257,7 @@ def extend(s: Space, b: Body, t: Tree, node: int, x: Any, why: Any) -> int:
 
 
 @compiled
-def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
+def nearest_nodes(t: Tree, p: Vector, found: Any, far: Any) -> None:
     """The len(found) nodes whose tools are nearest to a point, nearest first.
 
     Args:
@@ -273,7 +276,7 @@ def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
             for j in range(b - shell, b + shell + 1):
                 side = abs(i - a) == shell or abs(j - b) == shell
                 for k in range(c - shell, c + shell + 1, 1 if side else 2 * shell):
-                    node = t.last[cell_of(i, j, k)]
+                    node = np.int64(t.last[cell_of(i, j, k)])
                     while node >= 0:
                         # A node of another cell may be listed with those of this.
                         if (
@@ -282,7 +285,7 @@ def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
                             and math.floor(t.tip[node, 2] / CELL) == k
                         ):
                             _rank(t, p, node, found, far)
-                        node = t.earlier[node]
+                        node = np.int64(t.earlier[node])
         if far[count - 1] <= (shell * CELL) ** 2:
             return
     for n in range(count):
@@ -293,7 +296,7 @@ def nearest_nodes(t: Tree, p: Numbers, found: Any, far: Any) -> None:
 
 
 @compiled
-def _rank(t: Tree, p: Numbers, node: int, found: Any, far: Any) -> None:
+def _rank(t: Tree, p: Vector, node: int, found: Any, far: Any) -> None:
     """Puts a node among the nearest if it is one."""
     d = sub((t.tip[node, 0], t.tip[node, 1], t.tip[node, 2]), p)
     d2 = dot(d, d)

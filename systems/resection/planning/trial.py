@@ -10,6 +10,7 @@ from plants.snake.kinematics import POINTS
 from plants.snake.parameters import SnakeParams
 from plants.snake.snake_body import OK, Body, body_of, place
 from plants.tissue.space import Space, roll_back
+from systems.common.signal import vector
 from systems.resection.planning.feasibility import (
     NEVER,
     Answer,
@@ -100,7 +101,8 @@ def _carried_out(
     O2 = R_WE @ start + o - (params.straight_module + params.tool_offset) * n
     tips = tips_of(own, start, params) @ R_WE.T + o
     start = R_WE @ start + o
-    status = posture_at(body, O2, n, x)
+    axis = vector(n)
+    status = posture_at(body, vector(O2), axis, x)
     if status == OK:
         status = _approach(session, s, body, x)
     if status == OK:
@@ -108,7 +110,7 @@ def _carried_out(
             s,
             body,
             session.tree,
-            n,
+            axis,
             procedure.length,
             procedure.pitch,
             widest_bend(procedure, params),
@@ -150,7 +152,7 @@ def _approach(session: Any, s: Space, body: Body, x: NDArray[np.float64]) -> int
     tree, why, c = session.tree, session.why, np.empty((POINTS, 3))
     place(body, x, c)
     found, far = np.empty(STARTS, np.int64), np.empty(STARTS)
-    nearest_nodes(tree, c[7], found, far)
+    nearest_nodes(tree, vector(c[7]), found, far)
     blamed, best, status = None, -1.0, LIMIT
     for node in [int(tree.size[2]), *found[found >= 0].tolist()]:
         freed, roomed = int(s.used[0]), int(s.used[1])

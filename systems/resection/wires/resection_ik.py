@@ -101,10 +101,10 @@ def _step(
     status, x = HOLD, np.empty(7)
     n, m = norm(target.n), norm(target.n_I)
     if finite_target(target) and n > 0.0 and m > 0.0:
-        axes = np.array(over(target.n, n)), np.array(over(target.n_I, m))
+        axes = over(target.n, n), over(target.n_I, m)
         travel = c.travel[0], c.travel[1]
-        p, bend = np.array(target.p), c.max_bend
-        status = solve_tool(p, *axes, c.half_pitch, c.tool_offset, bend, travel, x)
+        h, tool, bend = c.half_pitch, c.tool_offset, c.max_bend
+        status = solve_tool(target.p, *axes, h, tool, bend, travel, x)
     now = follow(c, now, x) if status == REACHED else standing(now.x)
     return now, Posture(now.x), IkStatus(float(status))
 
