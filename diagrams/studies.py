@@ -1,6 +1,7 @@
 """The systems that scenarios can run, and scenarios loaded by their names."""
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +22,32 @@ from diagrams.common.tree import (
     require,
     settle,
 )
-from diagrams.gauze.study import STUDY as GAUZE
-from diagrams.keyhole.study import STUDY as KEYHOLE
-from diagrams.navigation.study import STUDY as NAVIGATION
-from diagrams.resection.study import STUDY as RESECTION
-from diagrams.snake.study import STUDY as SNAKE
-from diagrams.wrist.study import STUDY as WRIST
 from systems.common.parameter import check
 
-STUDIES = {
-    study.name: study for study in (GAUZE, NAVIGATION, WRIST, SNAKE, RESECTION, KEYHOLE)
-}
+
+class Studies(dict[str, Any]):
+    """Studies by the systems' names; first the modules that they are in.
+
+    One is imported when it is asked for: all take seconds, and a run needs one.
+    """
+
+    def __getitem__(self, name: str) -> Study:
+        """The study of a system."""
+        found = super().__getitem__(name)
+        if isinstance(found, str):
+            found = self[name] = import_module(found).STUDY
+        study: Study = found
+        return study
+
+
+STUDIES = Studies(
+    gauze="diagrams.gauze.study",
+    navigation="diagrams.navigation.study",
+    wrist="diagrams.wrist.study",
+    snake="diagrams.snake.study",
+    resection="diagrams.resection.study",
+    keyhole="diagrams.keyhole.study",
+)
 """A scenario's `system` and the study that runs it."""
 
 
