@@ -216,7 +216,7 @@ def test_signals_have_the_names_of_their_declarations():
 
 
 def test_plots_of_two_methods_and_of_the_thesis():
-    figures = plots(run("nav_local_minimum"))
+    figures = plots(run("nav_local_minimum", "compare=[classical]"))
     drawn = {"path", "motion", "potential", "field_along", "figure_04", "figure_07"}
     assert drawn | {"notes_two_cases", "switching_step"} <= set(figures)
     assert "figure_12" not in figures  # the thesis's is empty
