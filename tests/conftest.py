@@ -21,6 +21,15 @@ GOLDEN = Path(__file__).parent / "golden.json"
 FIRST = ("resection", "gauze", "wrist", "snake")
 """Systems whose tests take longest and compile most kernels: they are begun with."""
 
+NOTEBOOKS = {
+    **dict.fromkeys(("bedside", "gauze_delivery", "inside", "tool_bypass"), "gauze"),
+    **dict.fromkeys(("perception", "switching_potentials"), "navigation"),
+    **dict.fromkeys(("snake_statics", "wire_snake"), "snake"),
+    **{"passive_wrist": "wrist", "resection": "resection", "keyhole": "keyhole"},
+    **{"learning": "learning"},
+}
+"""What is shown in which notebook."""
+
 CHROMIUM_FLAGS = [
     "--headless",
     "--no-sandbox",
@@ -50,6 +59,8 @@ def group(nodeid: str) -> str:
     row = name.partition("[")[2].removesuffix("]")
     if "test_golden" in path and row in systems():
         return systems()[row]
+    if name.startswith("test_it_runs") and row in NOTEBOOKS:
+        return NOTEBOOKS[row]
     folder = Path(path).parent
     return folder.name if folder.parent.name == "diagrams" else path
 

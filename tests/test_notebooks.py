@@ -1,11 +1,17 @@
-"""Notebooks are kept clean; that they run is tested by nbmake."""
+"""Notebooks are kept clean, and they run."""
 
 import json
 from pathlib import Path
+from types import ModuleType
 
+import matplotlib.pyplot as plt
 import pytest
 
+from tests.runs import once
+
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
+WORKERS = "campaigns"
+"""The notebook that starts processes: nbmake runs it, in a kernel of its own."""
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
@@ -17,3 +23,18 @@ def test_outputs_are_cleared_and_cells_are_short(path):
             assert cell["outputs"] == []
             assert cell["execution_count"] is None
             assert len(cell["source"]) <= 45
+
+
+@pytest.mark.parametrize(
+    "path", [p for p in NOTEBOOKS if p.stem != WORKERS], ids=lambda path: path.stem
+)
+def test_it_runs(path, monkeypatch):
+    """Here and not in a kernel, beside the tests whose runs it shows: see `group`."""
+    monkeypatch.chdir(path.parent)
+    monkeypatch.setattr("diagrams.common.run.simulate", once)
+    names = vars(ModuleType(path.stem))
+    for number, cell in enumerate(json.loads(path.read_text())["cells"]):
+        if cell["cell_type"] == "code":
+            code = "".join(cell["source"])
+            exec(compile(code, f"{path.name}, cell {number}", "exec"), names)
+    plt.close("all")
