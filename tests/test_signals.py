@@ -14,10 +14,19 @@ DECLARING = {"signal_in", "signal_out", "state_out"}
 MAPS = {"declare_step", "declare_update", "declare_map"}
 
 
-def ports(tree: ast.AST) -> set[str]:
+type Nodes = list[ast.AST]
+"""Of a file, walked once."""
+
+
+def parsed(text: str) -> Nodes:
+    """All nodes of a file's text."""
+    return list(ast.walk(ast.parse(text)))
+
+
+def ports(nodes: Nodes) -> set[str]:
     """Names of the ports that a file declares."""
     found = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
             continue
         if node.func.attr in DECLARING and isinstance(node.args[0], ast.Constant):
@@ -28,15 +37,15 @@ def ports(tree: ast.AST) -> set[str]:
     return found
 
 
-def annotated(tree: ast.AST, signals: set[str]) -> set[str]:
+def annotated(nodes: Nodes, signals: set[str]) -> set[str]:
     """Names of the arguments that a file's functions take as signals."""
-    arguments = [node for node in ast.walk(tree) if isinstance(node, ast.arg)]
+    arguments = [node for node in nodes if isinstance(node, ast.arg)]
     return {a.arg for a in arguments if getattr(a.annotation, "id", "") in signals}
 
 
-def tuples(tree: ast.AST) -> set[str]:
+def tuples(nodes: Nodes) -> set[str]:
     """Names of the signals that a file declares."""
-    classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    classes = [node for node in nodes if isinstance(node, ast.ClassDef)]
     return {
         c.name
         for c in classes
@@ -54,10 +63,10 @@ def is_literal(index: ast.expr) -> bool:
     return isinstance(index, ast.Constant) and isinstance(index.value, int)
 
 
-def literal_reads(tree: ast.AST, names: set[str]) -> list[str]:
+def literal_reads(nodes: Nodes, names: set[str]) -> list[str]:
     """Where a name is read by a literal index, or by `xyz` from one on."""
     found = []
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Subscript) and is_literal(node.slice):
             value = node.value
         elif (
@@ -74,21 +83,21 @@ def literal_reads(tree: ast.AST, names: set[str]) -> list[str]:
 
 
 def test_the_search_finds_what_it_looks_for():
-    tree = ast.parse(
+    nodes = parsed(
         "self.signal_in('guide', Guide)\n"
         "a = guide[7] + guide[0:3] + xyz(guide, 9) + other[1] + guide[i]"
     )
-    assert ports(tree) == {"guide"}
-    assert len(literal_reads(tree, {"guide"})) == 3
+    assert ports(nodes) == {"guide"}
+    assert len(literal_reads(nodes, {"guide"})) == 3
 
 
 def test_no_signal_is_read_by_a_literal_index():
-    trees = {file: ast.parse(file.read_text()) for file in FILES}
-    signals = set().union(*map(tuples, trees.values()))
+    read = {file: parsed(file.read_text()) for file in FILES}
+    signals = set().union(*map(tuples, read.values()))
     assert len(signals) > 40
     found = {}
-    for file, tree in trees.items():
-        reads = literal_reads(tree, ports(tree) | annotated(tree, signals))
+    for file, nodes in read.items():
+        reads = literal_reads(nodes, ports(nodes) | annotated(nodes, signals))
         if reads:
             found[str(file.relative_to(ROOT))] = reads
     assert not found
