@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from plants.tissue.image import MaskError, check_sizes, damaged, pose
 from plants.tissue.segments import MM, Mask, Segments, header, is_dicom
@@ -276,6 +275,8 @@ def _depth(mask: Mask) -> Array:
     """Distance of pixels to a shape's border, negative outside."""
     if not mask.any():
         return np.full(mask.shape, -1.0)
+    from scipy import ndimage  # takes a while
+
     inner, outer = map(ndimage.distance_transform_edt, (mask, ~mask))
     depth: Array = inner - outer
     return depth

@@ -29,6 +29,7 @@ from systems.common.geometry import norm, sub, xyz
 from systems.resection.planning.draws import Draws, normal, uniform
 from systems.resection.planning.tree import (
     DIRECT,
+    NOWHERE,
     Tree,
     add_node,
     extend,
@@ -299,7 +300,7 @@ def begin_stroke(
     wait = WAIT
     x = t.x[here(t)].copy()
     while True:
-        pick, most, begin = -1, 0.0, -1
+        pick, most, begin = -1, 0.0, NOWHERE
         for e in range(len(lib.x)):
             if lib.node[e] >= 0 or lib.gain[e] <= 0.0:
                 continue
