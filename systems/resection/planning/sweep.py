@@ -39,7 +39,7 @@ RAYS = 128
 RINGS = 64
 """Most rings of an elementary volume."""
 
-CLIPPED = np.bool_(False)
+CLIPPED: Any = np.bool_(False)
 """What is not rigid. A literal would have all compiled once more, for itself."""
 
 

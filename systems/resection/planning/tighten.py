@@ -137,7 +137,7 @@ def drive_again(
             jump = 1
         if jump:
             at += jump
-            new = np.int64(node[old[at]])
+            new: Any = np.int64(node[old[at]])
             if drive(s, b, t.x[start], x[at], t.size[1], why) == OK:
                 if new < 0:
                     new = add_node(t, b, start, x[at])

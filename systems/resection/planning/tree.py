@@ -26,7 +26,7 @@ CELL = 2e-3
 
 CELLS = 1 << 14
 
-NOWHERE = np.int64(-1)
+NOWHERE: Any = np.int64(-1)
 """No node. Of a type like a node's: with another, all would be compiled twice."""
 
 SHELLS = 6
@@ -163,7 +163,8 @@ def cut(t: Tree, nodes: int, visits: int) -> None:
 @compiled
 def here(t: Tree) -> int:
     """The node at which the robot stands."""
-    return np.int64(t.route[t.size[1] - 1])
+    node: Any = np.int64(t.route[t.size[1] - 1])
+    return node
 
 
 @compiled
@@ -276,7 +277,7 @@ def nearest_nodes(t: Tree, p: Vector, found: Any, far: Any) -> None:
             for j in range(b - shell, b + shell + 1):
                 side = abs(i - a) == shell or abs(j - b) == shell
                 for k in range(c - shell, c + shell + 1, 1 if side else 2 * shell):
-                    node = np.int64(t.last[cell_of(i, j, k)])
+                    node: Any = np.int64(t.last[cell_of(i, j, k)])
                     while node >= 0:
                         # A node of another cell may be listed with those of this.
                         if (
