@@ -45,6 +45,9 @@ def site(tmp_path_factory):
         # Ruff would be started for each of 3,000 signatures, to lay it out.
         rendering = "mkdocstrings_handlers.python._internal.rendering"
         patch.setattr(f"{rendering}._get_ruff_formatter", lambda: None)
+        # And what can be searched for is a fifth of what is left.
+        search = "material.plugins.search.plugin.SearchPlugin.on_page_context"
+        patch.setattr(search, lambda *told, **more: None)
         return build.build_site(folder / "out", [run]).parent
 
 
