@@ -13,7 +13,7 @@ its first call for the types it gets and cached on disk, where that can be writt
 import ast
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
-from functools import cache
+from functools import cache, cached_property
 import hashlib
 from importlib.util import find_spec
 import inspect
@@ -222,6 +222,32 @@ def _stamp(function: FunctionType) -> str:
     return hashlib.sha256(digests).hexdigest()
 
 
+class _Stamp:
+    """A fingerprint that is taken when it is first compared or kept.
+
+    That is at the function's first call; most of what is imported is never called.
+    """
+
+    def __init__(self, function: FunctionType) -> None:
+        self._function = function
+
+    @cached_property
+    def text(self) -> str:
+        """The fingerprint."""
+        return _stamp(self._function)
+
+    def __eq__(self, other: object) -> bool:
+        return self.text == (other.text if isinstance(other, _Stamp) else other)
+
+    def __str__(self) -> str:
+        """The fingerprint."""
+        return self.text
+
+    def __reduce__(self) -> Any:
+        """It is kept as a text."""
+        return str, (self.text,)
+
+
 class _Stamped:
     """A place for a function's compiled code that notices a change in any callee."""
 
@@ -232,9 +258,9 @@ class _Stamped:
         super().__init__(*function_and_file)
         self._function = function_and_file[0]
 
-    def get_source_stamp(self) -> str:
+    def get_source_stamp(self) -> Any:
         """The fingerprint of all that the function is made of."""
-        return _stamp(self._function)
+        return _Stamp(self._function)
 
     def get_disambiguator(self) -> str:
         """Tells functions of a file apart, also generated ones of the same text."""
