@@ -2,8 +2,10 @@
 
 import json
 from pathlib import Path
+import sys
 from types import ModuleType
 
+from IPython.core.interactiveshell import InteractiveShell
 import matplotlib.pyplot as plt
 import pytest
 
@@ -32,9 +34,9 @@ def test_it_runs(path, monkeypatch):
     """Here and not in a kernel, beside the tests whose runs it shows: see `group`."""
     monkeypatch.chdir(path.parent)
     monkeypatch.setattr("diagrams.common.run.simulate", once)
-    names = vars(ModuleType(path.stem))
-    for number, cell in enumerate(json.loads(path.read_text())["cells"]):
+    monkeypatch.setitem(sys.modules, path.stem, ModuleType(path.stem))
+    shell = InteractiveShell(user_module=sys.modules[path.stem])
+    for cell in json.loads(path.read_text())["cells"]:
         if cell["cell_type"] == "code":
-            code = "".join(cell["source"])
-            exec(compile(code, f"{path.name}, cell {number}", "exec"), names)
+            shell.run_cell("".join(cell["source"])).raise_error()
     plt.close("all")

@@ -20,6 +20,7 @@ import inspect
 import marshal
 from pathlib import Path
 import sys
+from time import time_ns
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -196,12 +197,17 @@ def _origins(function: FunctionType) -> list[tuple[str, frozenset[str]]]:
     return found
 
 
-def _stamp(function: FunctionType) -> str:
+def _stamp(function: FunctionType, loaded: int) -> str:
     """A fingerprint of all files that a function is made of.
 
     They are its own and those of the functions, constants and types that it names,
     and so on. numba's own stamp is of the first alone: it would go on using what was
     inlined from a file that has changed since. Imports are absolute, as everywhere.
+
+    Args:
+        function: The function.
+        loaded: When, in ns. What is in a file that was written later is not what runs:
+            the fingerprint is then one that no other process will have.
     """
     new = _origins(function)
     seen, sources = set(new), {}
@@ -219,7 +225,10 @@ def _stamp(function: FunctionType) -> str:
             new += [one for one in found if one not in seen]
             seen.update(found)
     digests = b"".join(sources[file].digest for file in sorted(sources))
-    return hashlib.sha256(digests).hexdigest()
+    stamp = hashlib.sha256(digests).hexdigest()
+    if any(Path(file).stat().st_mtime_ns > loaded for file in sources):
+        return f"{stamp} was loaded at {loaded} and has changed since"
+    return stamp
 
 
 class _Stamp:
@@ -230,11 +239,12 @@ class _Stamp:
 
     def __init__(self, function: FunctionType) -> None:
         self._function = function
+        self._loaded = time_ns()
 
     @cached_property
     def text(self) -> str:
         """The fingerprint."""
-        return _stamp(self._function)
+        return _stamp(self._function, self._loaded)
 
     def __eq__(self, other: object) -> bool:
         return self.text == (other.text if isinstance(other, _Stamp) else other)

@@ -267,13 +267,32 @@ def python(folder: Path, *program: str) -> str:
     ).stdout
 
 
-def test_a_change_in_a_called_file_is_noticed(tmp_path):
+def write_packages(folder: Path) -> None:
+    """Writes `PACKAGES`."""
     for name, source in PACKAGES.items():
-        file = tmp_path / name
+        file = folder / name
         file.parent.mkdir(exist_ok=True)
         (file.parent / "__init__.py").touch()
         decorator = "from systems.common.compiled import compiled\n"
         file.write_text(decorator + textwrap.dedent(source))
+
+
+def test_what_was_loaded_before_a_change_is_not_taken_for_what_it_became(tmp_path):
+    write_packages(tmp_path)
+    edit = (
+        "from pathlib import Path\n"
+        "from control.block import two_files_away as f\n"
+        "file = Path('ground/vectors.py')\n"
+        "file.write_text(file.read_text().replace('2.0 * x', '3.0 * x'))\n"
+        "print(f(1.0), len(f.stats.cache_hits))"
+    )
+    assert python(tmp_path, "-c", edit).split() == ["7.0", "0"]
+    again = "from control.block import two_files_away as f\nprint(f(1.0))"
+    assert python(tmp_path, "-c", again).split() == ["12.0"]
+
+
+def test_a_change_in_a_called_file_is_noticed(tmp_path):
+    write_packages(tmp_path)
 
     def run() -> tuple[dict[str, float], set[str]]:
         """Results, and whose code was made anew."""
