@@ -1,13 +1,15 @@
 """Tissue press: gauze is laid on an organ and pressed on it by force.
 
-Once R's tip is at its target for a while, it goes along the organ's normal n with
+Once R's tip is at its target for a while, and the wrist sure of its fulcrum, it goes
+along the organ's normal n with
 
     v = v_T - n (F_d - F) / b + k_t (place - p)_across,
 
 v_T being the organ's own velocity, so that the breath is followed and the force loop
-has only its error to mend. After the time of pressing R draws back along n, and the
-planner has it again. A tool that comes too near, a force that is too great, or one that
-cannot be told from friction: R draws back at once.
+has only its error to mend. (A wrist that does not know the breath yet follows its
+sensor's noise, and shakes the tip.) After the time of pressing R draws back along n,
+and the planner has it again. A tool that comes too near, a force that is too great, or
+one that cannot be told from friction: R draws back at once.
 """
 
 from dataclasses import dataclass
@@ -32,8 +34,10 @@ from systems.common.signals import (
     Estimate,
     Guide,
     MovingPoint,
+    Permission,
     RobotTool,
     Velocity,
+    finite_permission,
     usable,
 )
 from systems.common.step_block import StepBlock
@@ -90,6 +94,9 @@ class TissuePressParams:
     arrived: float = parameter(
         0.004, "so near to the target it is at the place", "m", above=0.0, most=0.02
     )
+    sure: float = parameter(
+        1.0, "share of its speed that the wrist must allow it", least=0.0, most=1.0
+    )
     wait: float = parameter(0.5, "at the place, before it begins", "s", least=0, most=9)
     leave: float = parameter(
         0.006,
@@ -117,18 +124,21 @@ def _step(
     target: Estimate,
     clearance: ClearanceStatus,
     touch: TissueTouch,
+    permission: Permission,
     moved: np.ndarray,
 ) -> tuple[Press, Velocity, Press]:
     sound = finite_velocity(v_safe) and finite_guide(guide) and finite_robot(robot)
     sound = sound and finite_target(target) and finite_clearance(clearance)
-    if not (sound and finite_touch(touch) and np.isfinite(moved).all()):
+    sound = sound and finite_touch(touch) and finite_permission(permission)
+    if not (sound and np.isfinite(moved).all()):
         return state, Velocity((0.0, 0.0, 0.0)), state
     row = moved[int(touch.organ)]
     off, v_T = (row[0], row[1], row[2]), (row[3], row[4], row[5])
     phase, since, place, held = state
     if phase == 0.0:
         is_there = usable(target) and norm(sub(target.p, robot.tip)) < params.arrived
-        if not is_there or touch.known < 0.5:
+        is_sure = touch.known > 0.5 and permission.speed_scale >= params.sure
+        if not (is_there and is_sure):
             since = time
         elif time - since >= params.wait:
             phase, since, place = 1.0, time, sub(robot.tip, off)
@@ -170,6 +180,7 @@ class TissuePress(StepBlock):
     Port ``target`` accepts the `Estimate` of S.
     Port ``clearance`` accepts the `ClearanceStatus` of the tools.
     Port ``touch`` accepts the `TissueTouch`.
+    Port ``permission`` accepts the passive wrist's `Permission`.
     Port ``organs`` accepts the `MovingPoint` of each organ.
     Port ``v_R`` emits the `Velocity` of the guide point.
     Port ``press`` emits how far it is, `Press`.
@@ -194,6 +205,7 @@ class TissuePress(StepBlock):
                 "target": Estimate,
                 "clearance": ClearanceStatus,
                 "touch": TissueTouch,
+                "permission": Permission,
                 "organs": Many(MovingPoint, organs),
             },
             Press(0.0, 0.0, (0.0, 0.0, 0.0), 0.0),
