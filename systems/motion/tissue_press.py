@@ -7,9 +7,10 @@ along the organ's normal n with
 
 v_T being the organ's own velocity, so that the breath is followed and the force loop
 has only its error to mend. (A wrist that does not know the breath yet follows its
-sensor's noise, and shakes the tip.) After the time of pressing R draws back along n,
-and the planner has it again. A tool that comes too near, a force that is too great, or
-one that cannot be told from friction: R draws back at once.
+sensor's noise, and shakes the tip.) R dabs until F is known well enough, then holds.
+After the time of pressing it draws back along n, and the planner has it again. A tool
+that comes too near, a force that is too great, or one that cannot be told from
+friction: R draws back at once.
 """
 
 from dataclasses import dataclass
@@ -54,6 +55,7 @@ class Phase(Code):
     LEAVING = 3, "drawing back"
     DONE = 4, "done"
     GIVEN_UP = 5, "given up: drawn back before the time"
+    LIFTED = 6, "lifted, to touch again"
 
 
 class Press(NamedTuple):
@@ -63,6 +65,7 @@ class Press(NamedTuple):
     since: Annotated[float, Field("s", "it began; the time at the place", 0.0)]
     place: Annotated[Vector, Field("m", "in the resting organ", (0.0, 0.0, -0.1))]
     held: Annotated[float, Field("1", "1 if the time was held, else 0", 0.0)]
+    touches: Annotated[float, Field("1", "so far", 0.0)]
 
 
 @dataclass
@@ -76,6 +79,17 @@ class TissuePressParams:
     tolerance: float = parameter(0.1, "within it F counts as F_d", "N", above=0, most=1)
     settling: float = parameter(
         0.4, "within it for so long, the time of pressing begins", "s", least=0, most=9
+    )
+    # Each touch tells anew the force from the drift of the sensor's zero.
+    doubt: float = parameter(
+        0.25,
+        "sigma of F over the tolerance: more, and R dabs",
+        above=0.0,
+        most=1.0,
+    )
+    touches: int = parameter(6, "at the most, before it holds", least=1, most=20)
+    lift: float = parameter(
+        0.001, "room to the organ between two touches", "m", above=0.0, most=0.01
     )
     damping: float = parameter(
         40.0,
@@ -134,7 +148,7 @@ def _step(
         return state, Velocity((0.0, 0.0, 0.0)), state
     row = moved[int(touch.organ)]
     off, v_T = (row[0], row[1], row[2]), (row[3], row[4], row[5])
-    phase, since, place, held = state
+    phase, since, place, held, touches = state
     if phase == 0.0:
         is_there = usable(target) and norm(sub(target.p, robot.tip)) < params.arrived
         is_sure = touch.known > 0.5 and permission.speed_scale >= params.sure
@@ -146,21 +160,32 @@ def _step(
         if abs(touch.force - params.force) > params.tolerance:
             since = time
         elif time - since >= params.settling:
-            phase, since = 2.0, time
+            touches += 1.0
+            is_told = touch.sigma <= params.doubt * params.tolerance
+            phase = 2.0 if is_told or touches >= params.touches else 6.0
+            since = time
+    elif phase == 6.0:
+        if touch.room < params.lift:
+            since = time
+        elif time - since >= params.settling:
+            phase, since = 1.0, time
     elif phase == 2.0 and time - since >= params.duration:
         phase, since, held = 3.0, time, 1.0
     elif phase == 3.0 and touch.room > params.leave:
         phase, since = (4.0 if held > 0.5 else 5.0), time
     is_wrong = touch.known < 0.5 or touch.force > params.most_force
-    if 1.0 <= phase <= 2.0 and (is_wrong or clearance.room < -0.001):
+    presses = 1.0 <= phase <= 2.0 or phase == 6.0
+    if presses and (is_wrong or clearance.room < -0.001):
         phase, since = 3.0, time
-    after = Press(phase, since, place, held)
-    if not 1.0 <= phase <= 3.0:
+    after = Press(phase, since, place, held, touches)
+    if not (presses or phase == 3.0):
         return after, v_safe, after
     into = (params.force - touch.force) / params.damping
     into = min(into, params.gentle + max(0.0, touch.room))  # slower the nearer
     if phase == 3.0:
         into = -params.max_speed
+    elif phase == 6.0:
+        into = -params.max_speed if touch.room < params.lift else 0.0
     into = max(-params.max_speed, min(params.max_speed, into))
     aside = across(sub(plus(place, off), robot.tip), touch.n)
     aside = limited(scaled(params.place_rate, aside), params.max_speed)
@@ -208,7 +233,7 @@ class TissuePress(StepBlock):
                 "permission": Permission,
                 "organs": Many(MovingPoint, organs),
             },
-            Press(0.0, 0.0, (0.0, 0.0, 0.0), 0.0),
+            Press(0.0, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0),
             {"v_R": Velocity, "press": Press},
             params.period,
         )

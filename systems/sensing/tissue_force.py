@@ -28,7 +28,7 @@ from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Vector
 from systems.common.signals import Point, ShaftMotion, Wrench
 from systems.common.step_block import StepBlock
-from systems.sensing.touch_filter import SIZE, pressing, prior, weigh
+from systems.sensing.touch_filter import SIZE, doubt, pressing, prior, weigh
 
 
 class TissueTouch(NamedTuple):
@@ -41,6 +41,7 @@ class TissueTouch(NamedTuple):
     organ: Annotated[float, Field("1", "number of the nearest organ", 0.0)]
     known: Annotated[float, Field("1", "1 if F has a moment, else 0", 1.0)]
     zero: Annotated[float, Field("N", "that is taken away", 0.0)]
+    sigma: Annotated[float, Field("N", "of F", 0.02)]
 
 
 @dataclass
@@ -119,7 +120,8 @@ def _update(
         x = weigh(params, x, m_I, reach, scaled(1.0 if near else 0.0, arm), -room)
     force = pressing(x, -room) if known and near else 0.0
     zero = dot(xyz(x[0], 0), arm) / max(lever * lever, 1e-9)
-    after = TissueTouch(force, n, p, room, float(organ), 1.0 if known else 0.0, zero)
+    sigma, is_known = doubt(x, max(0.0, -room)), 1.0 if known else 0.0
+    after = TissueTouch(force, n, p, room, float(organ), is_known, zero, sigma)
     return after, x.ravel()
 
 
@@ -151,7 +153,7 @@ class TissueForce(StepBlock):
         check(params)
         organs = organs or OrganSet.nothing()
         nowhere = (0.0, 0.0, 0.0)
-        start = TissueTouch(0.0, (0.0, 0.0, 1.0), nowhere, 1.0, 0.0, 0.0, 0.0)
+        start = TissueTouch(0.0, (0.0, 0.0, 1.0), nowhere, 1.0, 0.0, 0.0, 0.0, 0.0)
         self.declare_update(
             _update,
             [packed(params, length=float(length)), *arrays(organs)],

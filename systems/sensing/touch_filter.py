@@ -6,9 +6,10 @@ d being how deep the tip is where the organ is thought to be. State x (5): the z
 (3), which drifts as the sensor does; k; and g, which is k times what the surface is
 lower than thought. The last two stay, so that neither noise nor drift reaches F as
 long as d does not change; what is left of both is the error of the step in m_I when
-the organ is touched.
+the organ is touched, and less of it after each further touch.
 """
 
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,14 @@ def prior(c: Any, length: float) -> Floats:
 def pressing(belief: Floats, depth: float) -> float:
     """F in N, at a depth in m."""
     return max(0.0, belief[0, K] * depth - belief[0, G])
+
+
+@compiled
+def doubt(belief: Floats, depth: float) -> float:
+    """Standard deviation of F in N, at a depth in m."""
+    P = belief[1:]
+    of_g = P[G, G] - 2.0 * depth * P[K, G]
+    return sqrt(max(0.0, depth * depth * P[K, K] + of_g))
 
 
 @compiled

@@ -6,7 +6,7 @@ import pytest
 from systems.common.compiled import packed
 from systems.common.geometry import cross, sub
 from systems.sensing.tissue_force import TissueForceParams, moment_about
-from systems.sensing.touch_filter import G, K, pressing, prior, weigh
+from systems.sensing.touch_filter import K, doubt, pressing, prior, weigh
 
 P_S, P_I, P_P = (0.0, 0.05, 0.25), (0.001, -0.002, 0.0), (0.02, 0.02, -0.09)
 N = (0.5, 0.1, 0.86)
@@ -22,9 +22,9 @@ def test_wall_and_friction_do_not_count(wall):
 
 
 def touched(k: float, lower: float, seed: int) -> tuple[float, float, float]:
-    """Error of F in N after a touch of 2 s, how sure the filter is, error at no touch.
+    """Error of F in N after a touch of 1 s, how sure the filter is, and F before.
 
-    The tip is in the air for 3 s and then goes 1 mm deep, in 0.5 s.
+    The tip is in the air for 1.5 s and then goes 1 mm deep, in 0.5 s.
     """
     params = TissueForceParams()
     record, belief = packed(params)[0], prior(params, 0.4)
@@ -34,17 +34,15 @@ def touched(k: float, lower: float, seed: int) -> tuple[float, float, float]:
     noise = np.hypot(params.moment_noise, reach * params.force_noise)
     bias = rng.normal(0.0, params.moment_bias, 3)
     before = force = depth = 0.0
-    for i in range(660):
-        depth = min(1e-3, 2e-3 * (params.period * i - 3.0))
+    for i in range(360):
+        depth = min(1e-3, 2e-3 * (params.period * i - 1.5))
         force = max(0.0, k * (depth - lower))
         bias += rng.normal(0.0, drift, 3)
         m = bias + force * np.array(arm) + rng.normal(0.0, noise, 3)
         belief = weigh(record, belief, tuple(m.tolist()), reach, arm, depth)
-        if i == 300:
+        if i == 120:
             before = pressing(belief, depth)
-    slope = np.zeros(5)
-    slope[K], slope[G] = depth, -1.0
-    return pressing(belief, depth) - force, np.sqrt(slope @ belief[1:] @ slope), before
+    return pressing(belief, depth) - force, doubt(belief, depth), before
 
 
 def test_it_is_as_sure_as_it_says_of_a_stiffness_and_a_surface_it_does_not_know():
@@ -52,7 +50,7 @@ def test_it_is_as_sure_as_it_says_of_a_stiffness_and_a_surface_it_does_not_know(
     rows = np.array([touched(k, h, seed) for seed in range(8) for k, h in tissues])
     error, sigma, before = rows.T
     assert (before == 0.0).all()
-    assert sigma.max() < 0.05
+    assert sigma.max() < 0.06
     # 99 % of means of 32 squares lie within.
     assert 0.45 < np.mean((error / sigma) ** 2) < 1.8
 
@@ -60,6 +58,8 @@ def test_it_is_as_sure_as_it_says_of_a_stiffness_and_a_surface_it_does_not_know(
 def test_what_has_no_lever_is_not_taken_for_a_force():
     params = TissueForceParams()
     belief = prior(params, 0.4)
-    there = weigh(packed(params)[0], belief, (1e-2, 0, 0), 0.3, (0.0, 0.0, 0.0), 1e-3)
+    there = weigh(
+        packed(params)[0], belief, (1e-2, 0.0, 0.0), 0.3, (0.0, 0.0, 0.0), 1e-3
+    )
     assert there[0, K] == belief[0, K]
     assert there[0, 0] > 0.0
