@@ -71,6 +71,7 @@ PRESS_WIRES = [
     ("robot_location.robot_tool", "tissue_press.robot_tool"),
     ("target.estimate", "tissue_press.target"),
     ("tissue_force.touch", "tissue_press.touch"),
+    ("passive_wrist.permission", "tissue_press.permission"),
     ("tissue_press.v_R", "tool_navigation.v_R"),
     ("organ_touch.applied", "wrist_sensor.applied_spatial_force"),
 ]

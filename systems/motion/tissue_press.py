@@ -1,13 +1,16 @@
 """Tissue press: gauze is laid on an organ and pressed on it by force.
 
-Once R's tip is at its target for a while, it goes along the organ's normal n with
+Once R's tip is at its target for a while, and the wrist sure of its fulcrum, it goes
+along the organ's normal n with
 
     v = v_T - n (F_d - F) / b + k_t (place - p)_across,
 
 v_T being the organ's own velocity, so that the breath is followed and the force loop
-has only its error to mend. After the time of pressing R draws back along n, and the
-planner has it again. A tool that comes too near, a force that is too great, or one that
-cannot be told from friction: R draws back at once.
+has only its error to mend. (A wrist that does not know the breath yet follows its
+sensor's noise, and shakes the tip.) R dabs until F is known well enough, then holds.
+After the time of pressing it draws back along n, and the planner has it again. A tool
+that comes too near, a force that is too great, or one that cannot be told from
+friction: R draws back at once.
 """
 
 from dataclasses import dataclass
@@ -32,8 +35,10 @@ from systems.common.signals import (
     Estimate,
     Guide,
     MovingPoint,
+    Permission,
     RobotTool,
     Velocity,
+    finite_permission,
     usable,
 )
 from systems.common.step_block import StepBlock
@@ -50,6 +55,7 @@ class Phase(Code):
     LEAVING = 3, "drawing back"
     DONE = 4, "done"
     GIVEN_UP = 5, "given up: drawn back before the time"
+    LIFTED = 6, "lifted, to touch again"
 
 
 class Press(NamedTuple):
@@ -59,6 +65,7 @@ class Press(NamedTuple):
     since: Annotated[float, Field("s", "it began; the time at the place", 0.0)]
     place: Annotated[Vector, Field("m", "in the resting organ", (0.0, 0.0, -0.1))]
     held: Annotated[float, Field("1", "1 if the time was held, else 0", 0.0)]
+    touches: Annotated[float, Field("1", "so far", 0.0)]
 
 
 @dataclass
@@ -72,6 +79,17 @@ class TissuePressParams:
     tolerance: float = parameter(0.1, "within it F counts as F_d", "N", above=0, most=1)
     settling: float = parameter(
         0.4, "within it for so long, the time of pressing begins", "s", least=0, most=9
+    )
+    # Each touch tells anew the force from the drift of the sensor's zero.
+    doubt: float = parameter(
+        0.25,
+        "sigma of F over the tolerance: more, and R dabs",
+        above=0.0,
+        most=1.0,
+    )
+    touches: int = parameter(6, "at the most, before it holds", least=1, most=20)
+    lift: float = parameter(
+        0.001, "room to the organ between two touches", "m", above=0.0, most=0.01
     )
     damping: float = parameter(
         40.0,
@@ -89,6 +107,9 @@ class TissuePressParams:
     )
     arrived: float = parameter(
         0.004, "so near to the target it is at the place", "m", above=0.0, most=0.02
+    )
+    sure: float = parameter(
+        1.0, "share of its speed that the wrist must allow it", least=0.0, most=1.0
     )
     wait: float = parameter(0.5, "at the place, before it begins", "s", least=0, most=9)
     leave: float = parameter(
@@ -117,18 +138,21 @@ def _step(
     target: Estimate,
     clearance: ClearanceStatus,
     touch: TissueTouch,
+    permission: Permission,
     moved: np.ndarray,
 ) -> tuple[Press, Velocity, Press]:
     sound = finite_velocity(v_safe) and finite_guide(guide) and finite_robot(robot)
     sound = sound and finite_target(target) and finite_clearance(clearance)
-    if not (sound and finite_touch(touch) and np.isfinite(moved).all()):
+    sound = sound and finite_touch(touch) and finite_permission(permission)
+    if not (sound and np.isfinite(moved).all()):
         return state, Velocity((0.0, 0.0, 0.0)), state
     row = moved[int(touch.organ)]
     off, v_T = (row[0], row[1], row[2]), (row[3], row[4], row[5])
-    phase, since, place, held = state
+    phase, since, place, held, touches = state
     if phase == 0.0:
         is_there = usable(target) and norm(sub(target.p, robot.tip)) < params.arrived
-        if not is_there or touch.known < 0.5:
+        is_sure = touch.known > 0.5 and permission.speed_scale >= params.sure
+        if not (is_there and is_sure):
             since = time
         elif time - since >= params.wait:
             phase, since, place = 1.0, time, sub(robot.tip, off)
@@ -136,21 +160,32 @@ def _step(
         if abs(touch.force - params.force) > params.tolerance:
             since = time
         elif time - since >= params.settling:
-            phase, since = 2.0, time
+            touches += 1.0
+            is_told = touch.sigma <= params.doubt * params.tolerance
+            phase = 2.0 if is_told or touches >= params.touches else 6.0
+            since = time
+    elif phase == 6.0:
+        if touch.room < params.lift:
+            since = time
+        elif time - since >= params.settling:
+            phase, since = 1.0, time
     elif phase == 2.0 and time - since >= params.duration:
         phase, since, held = 3.0, time, 1.0
     elif phase == 3.0 and touch.room > params.leave:
         phase, since = (4.0 if held > 0.5 else 5.0), time
     is_wrong = touch.known < 0.5 or touch.force > params.most_force
-    if 1.0 <= phase <= 2.0 and (is_wrong or clearance.room < -0.001):
+    presses = 1.0 <= phase <= 2.0 or phase == 6.0
+    if presses and (is_wrong or clearance.room < -0.001):
         phase, since = 3.0, time
-    after = Press(phase, since, place, held)
-    if not 1.0 <= phase <= 3.0:
+    after = Press(phase, since, place, held, touches)
+    if not (presses or phase == 3.0):
         return after, v_safe, after
     into = (params.force - touch.force) / params.damping
     into = min(into, params.gentle + max(0.0, touch.room))  # slower the nearer
     if phase == 3.0:
         into = -params.max_speed
+    elif phase == 6.0:
+        into = -params.max_speed if touch.room < params.lift else 0.0
     into = max(-params.max_speed, min(params.max_speed, into))
     aside = across(sub(plus(place, off), robot.tip), touch.n)
     aside = limited(scaled(params.place_rate, aside), params.max_speed)
@@ -170,6 +205,7 @@ class TissuePress(StepBlock):
     Port ``target`` accepts the `Estimate` of S.
     Port ``clearance`` accepts the `ClearanceStatus` of the tools.
     Port ``touch`` accepts the `TissueTouch`.
+    Port ``permission`` accepts the passive wrist's `Permission`.
     Port ``organs`` accepts the `MovingPoint` of each organ.
     Port ``v_R`` emits the `Velocity` of the guide point.
     Port ``press`` emits how far it is, `Press`.
@@ -194,9 +230,10 @@ class TissuePress(StepBlock):
                 "target": Estimate,
                 "clearance": ClearanceStatus,
                 "touch": TissueTouch,
+                "permission": Permission,
                 "organs": Many(MovingPoint, organs),
             },
-            Press(0.0, 0.0, (0.0, 0.0, 0.0), 0.0),
+            Press(0.0, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0),
             {"v_R": Velocity, "press": Press},
             params.period,
         )

@@ -6,32 +6,29 @@ moment about I; the tissue's force F n at the tip P has:
 
     m_I = m_S - (p_I - p_S) x f = F (p_P - p_I) x n,
 
-n being the organ's normal there. F is the least-squares solution; its zero is taken
-while the tip is still clear. It is noisy, so what is fast comes from how deep the tip
-goes,
-
-    dF^/dt = k d(depth)/dt + (F - F^) / tau,
-
-with a stiffness k that need be known roughly only. Straight along the shaft (n parallel
-to P - I) the touch has no moment, and cannot be told from friction: then F is not
-known.
+n being the organ's normal there. A Kalman filter (`touch_filter`) knows the sensor's
+noise and drift, and from them its zero, the tissue's stiffness k and where the surface
+is, so that what is fast comes from how deep the tip goes. Straight along the shaft (n
+parallel to P - I) the touch has no moment, and cannot be told from friction: then F is
+not known.
 """
 
 from dataclasses import dataclass
-from math import exp
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from plants.instruments.instrument import GAUZE_RADIUS
 from plants.organs.distance import Organs, distance, normal
+from plants.organs.distance_grid import ERROR
 from plants.organs.organs import OrganSet, arrays, port
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import along, cross, dot, norm, scaled, sub
+from systems.common.geometry import along, cross, dot, norm, scaled, sub, xyz
 from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Vector
 from systems.common.signals import Point, ShaftMotion, Wrench
 from systems.common.step_block import StepBlock
+from systems.sensing.touch_filter import SIZE, doubt, pressing, prior, weigh
 
 
 class TissueTouch(NamedTuple):
@@ -44,6 +41,7 @@ class TissueTouch(NamedTuple):
     organ: Annotated[float, Field("1", "number of the nearest organ", 0.0)]
     known: Annotated[float, Field("1", "1 if F has a moment, else 0", 1.0)]
     zero: Annotated[float, Field("N", "that is taken away", 0.0)]
+    sigma: Annotated[float, Field("N", "of F", 0.02)]
 
 
 @dataclass
@@ -51,10 +49,31 @@ class TissueForceParams:
     """Parameters of `TissueForce`."""
 
     period: float = parameter(1 / 120, "of the readings", "s", above=0.0, most=0.1)
-    stiffness: float = parameter(500.0, "k, as expected", "N/m", least=0.0, most=5000.0)
-    time_constant: float = parameter(0.8, "tau", "s", least=0.0, most=5.0)
-    zero_time: float = parameter(
-        1.0, "time constant of the zero, while clear", "s", above=0.0, most=60.0
+    stiffness: float = parameter(500.0, "k, as expected", "N/m", above=0.0, most=5000.0)
+    stiffness_doubt: float = parameter(
+        0.5, "standard deviation of k over that", above=0.0, most=1.0
+    )
+    surface_doubt: float = parameter(
+        ERROR, "standard deviation of where the surface is", "m", above=0.0, most=0.01
+    )
+    # Of the sensor, as `ToolWrenchParams` and `FulcrumParams` have them.
+    force_noise: float = parameter(
+        0.05, "standard deviation of each axis", "N", above=0, most=5
+    )
+    moment_noise: float = parameter(
+        0.005, "standard deviation of each axis", "N m", above=0, most=0.5
+    )
+    force_drift: float = parameter(
+        0.004, "random walk of the bias", "N/sqrt(s)", least=0, most=1
+    )
+    moment_drift: float = parameter(
+        0.0004, "random walk of the bias", "N m/sqrt(s)", least=0, most=0.1
+    )
+    force_bias: float = parameter(
+        0.02, "standard deviation of the bias at first", "N", above=0, most=5
+    )
+    moment_bias: float = parameter(
+        0.002, "standard deviation of the bias at first", "N m", above=0, most=0.5
     )
     touch_room: float = parameter(
         0.002, "nearer to an organ the tip may touch it", "m", least=0.0, most=0.01
@@ -65,23 +84,9 @@ class TissueForceParams:
 
 
 @compiled
-def tissue_force(
-    m_S: Vector, f: Vector, p_S: Vector, p_I: Vector, p_P: Vector, n: Vector
-) -> tuple[float, float]:
-    """F in N, by the moment about the fulcrum, and its lever in m.
-
-    Args:
-        m_S: Moment about S, N m.
-        f: Force, N.
-        p_S: Where the sensor is, m.
-        p_I: The fulcrum, m.
-        p_P: R's tip, m.
-        n: The organ's normal.
-    """
-    m_I = sub(m_S, cross(sub(p_I, p_S), f))
-    arm = cross(sub(p_P, p_I), n)
-    square = dot(arm, arm)
-    return dot(m_I, arm) / max(square, 1e-9), norm(arm)
+def moment_about(p_I: Vector, m_S: Vector, f: Vector, p_S: Vector) -> Vector:
+    """Moment about the fulcrum I in N m, of a force f in N and a moment about S."""
+    return sub(m_S, cross(sub(p_I, p_S), f))
 
 
 @compiled
@@ -90,11 +95,12 @@ def _update(
     values: np.ndarray,
     table: np.ndarray,
     touch: TissueTouch,
+    belief: np.ndarray,
     wrench: Wrench,
     shaft: ShaftMotion,
     pivot: Point,
     moved: np.ndarray,
-) -> tuple[TissueTouch]:
+) -> tuple[TissueTouch, np.ndarray]:
     organs = Organs(values, table, moved)
     p = along(shaft.p, params.length, shaft.u)
     room, organ = 1e9, 0
@@ -103,22 +109,20 @@ def _update(
         if here < room:
             room, organ = here, k
     n = normal(organs, organ, p)
-    raw, lever = tissue_force(wrench.m, wrench.f, shaft.p, pivot.p, p, n)
-    known = wrench.valid > 0.5 and lever > params.least_lever and abs(raw) < 1e3
-    force, zero = touch.force, touch.zero
-    if not known:
-        return (TissueTouch(0.0, n, p, room, float(organ), 0.0, zero),)
-    if room > params.touch_room:
-        share = 1.0 - exp(-params.period / params.zero_time)
-        zero += share * (raw - zero)
-        force = 0.0
-    else:
-        share = 1.0
-        if params.time_constant > 0.0:
-            share = 1.0 - exp(-params.period / params.time_constant)
-        deeper = max(0.0, -room) - max(0.0, -touch.room)
-        force += params.stiffness * deeper + share * (raw - zero - force)
-    return (TissueTouch(force, n, p, room, float(organ), 1.0, zero),)
+    reach, arm = norm(sub(pivot.p, shaft.p)), cross(sub(p, pivot.p), n)
+    m_I = moment_about(pivot.p, wrench.m, wrench.f, shaft.p)
+    near = room <= params.touch_room
+    lever = norm(arm)
+    known = wrench.valid > 0.5 and lever > params.least_lever and norm(m_I) < 1e3
+    x = belief.reshape((SIZE + 1, SIZE))
+    # What has no lever says nothing of the zero either, but where nothing is touched.
+    if wrench.valid > 0.5 and norm(m_I) < 1e3 and (known or not near):
+        x = weigh(params, x, m_I, reach, scaled(1.0 if near else 0.0, arm), -room)
+    force = pressing(x, -room) if known and near else 0.0
+    zero = dot(xyz(x[0], 0), arm) / max(lever * lever, 1e-9)
+    sigma, is_known = doubt(x, max(0.0, -room)), 1.0 if known else 0.0
+    after = TissueTouch(force, n, p, room, float(organ), is_known, zero, sigma)
+    return after, x.ravel()
 
 
 class TissueForce(StepBlock):
@@ -149,7 +153,7 @@ class TissueForce(StepBlock):
         check(params)
         organs = organs or OrganSet.nothing()
         nowhere = (0.0, 0.0, 0.0)
-        start = TissueTouch(0.0, (0.0, 0.0, 1.0), nowhere, 1.0, 0.0, 0.0, 0.0)
+        start = TissueTouch(0.0, (0.0, 0.0, 1.0), nowhere, 1.0, 0.0, 0.0, 0.0, 0.0)
         self.declare_update(
             _update,
             [packed(params, length=float(length)), *arrays(organs)],
@@ -159,7 +163,7 @@ class TissueForce(StepBlock):
                 "pivot": Point,
                 **port(organs),
             },
-            {"touch": start},
+            {"touch": start, "_belief": prior(params, length).ravel()},
             params.period,
             timed=False,
         )
