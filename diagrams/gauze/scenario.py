@@ -226,8 +226,12 @@ def contact_rules(scenario: GauzeScenario) -> Rules:
         "'pwe' with touch_yield.active: a push is told by its moment about the fulcrum"
     )
     yield not gives_way or scenario.wrist == "pwe", "wrist", told
-    rests = scenario.wall_motion.still and not scenario.abdomen.turning_stiffness
-    told = "False where wall or trocar load the shaft: it is taken for a push"
+    # Tried with a wall that breathes evenly; nothing else is known of.
+    wall = scenario.wall_motion
+    breathes = replace(wall, breathing=[0.0, 0.0, 0.0]).still
+    even = breathes and not (wall.irregular.disturbed or wall.curve)
+    rests = even and not scenario.abdomen.turning_stiffness
+    told = "False where the wall does more than breathe, or the trocar resists turning"
     yield not gives_way or rests, "touch_yield.active", told
     bends = scenario.instrument.bending_stiffness or scenario.shaft_bend.active
     told = "False with a shaft that bends: the two have not been tried together"

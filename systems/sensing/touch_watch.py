@@ -25,7 +25,17 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from systems.common.compiled import compiled, packed
-from systems.common.geometry import across, along, cross, dot, limited, norm, plus, sub
+from systems.common.geometry import (
+    across,
+    along,
+    cross,
+    dot,
+    limited,
+    norm,
+    plus,
+    scaled,
+    sub,
+)
 from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Vector, finiteness, flat, size, view
 from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
@@ -49,19 +59,24 @@ class Touched(NamedTuple):
 class Past(NamedTuple):
     """What is remembered.
 
-    The smooth wrench and the one before, N and N m; the fulcrum that was believed, m;
-    whether something pushes; how long a sudden force is kept back, and how long there
-    is no push left, s.
+    The smooth force and moment left, N and N m; their slow means, and that of the
+    fulcrum, m; by how far the estimator's is taken to be wrong, m; how far below it is
+    pushed, m, and its variance, m^2; whether something pushes; how long a moment is kept back, and how
+    long there is none left, s; 1 while b and d are kept.
     """
 
     f: Vector
-    m: Vector
+    r: Vector
     f_0: Vector
-    m_0: Vector
-    p: Vector
+    r_0: Vector
+    p_0: Vector
+    b: Vector
+    d: float
+    var_d: float
     touched: float
     held: float
     free: float
+    kept: float
 
 
 class Waits(NamedTuple):
@@ -71,9 +86,16 @@ class Waits(NamedTuple):
 
 
 class Told(NamedTuple):
-    """The fulcrum that the estimator said last, m; 1 if it is known, else 0."""
+    """What the estimator said last: the fulcrum, m and m/s; its sigmas, m; K, N/m.
+
+    And 1 if it is known, else 0.
+    """
 
     p: Vector
+    v: Vector
+    sigma_across: float
+    sigma_along: float
+    stiffness: float
     known: float
 
 
@@ -83,7 +105,7 @@ class TouchWatchParams:
 
     least: float = parameter(0.4, "force from which it does", "N", above=0, most=10)
     sure: float = parameter(
-        5.0, "standard deviations of its moment, at the least", least=0, most=20
+        4.0, "standard deviations of its moment, at the least", least=0, most=20
     )
     depth: float = parameter(
         0.01, "by which the fulcrum's may be wrong", "m", above=0, most=0.1
@@ -92,12 +114,21 @@ class TouchWatchParams:
         0.03, "time constant of the wrench", "s", above=0, most=0.5
     )
     slow: float = parameter(0.5, "of that before", "s", above=0, most=10)
-    sudden: float = parameter(
-        0.25, "change of the force that is kept back", "N", above=0, most=5
+    suspect: float = parameter(
+        3.0, "standard deviations from which it is kept back", least=0, most=20
     )
     hold: float = parameter(0.3, "for so long at the most", "s", least=0, most=2)
-    wall: float = parameter(
-        1.0, "force from which no moment means the wall", "N", above=0, most=20
+    sudden: float = parameter(
+        0.4, "change of the force that is kept back", "N", above=0, most=5
+    )
+    brief: float = parameter(
+        0.06, "for so long without a moment", "s", least=0, most=2
+    )
+    below: float = parameter(
+        0.06, "where a push is expected, with that deviation", "m", above=0, most=0.3
+    )
+    nearest: float = parameter(
+        0.02, "below which its share is not told", "m", above=0, most=0.3
     )
     release: float = parameter(
         0.1, "without a moment, after which it is over", "s", least=0, most=2
@@ -116,37 +147,48 @@ class TouchWatchParams:
 
 
 @compiled
-def place(
-    c: Any, past: Past, f: Vector, m: Vector, shaft: ShaftMotion
-) -> tuple[Vector, float, float, float]:
-    """Of a smooth wrench: what has changed, how far below the fulcrum, moment, margin.
+def moment_left(p: Vector, shaft: ShaftMotion, wrench: Wrench) -> tuple[Vector, float]:
+    """r, N m: what no force at p_WI explains of a wrench; and its depth, m."""
+    depth = dot(shaft.u, sub(p, shaft.p))
+    f = across(wrench.f, shaft.u)
+    return across(along(wrench.m, -depth, cross(shaft.u, f)), shaft.u), depth
+
+
+@compiled
+def placed(
+    c: Any, d: float, var_d: float, lever: Vector, r: Vector, doubt: float
+) -> tuple[float, float]:
+    """How far below the fulcrum it pushes, and the variance, after one reading.
 
     Args:
-        c: A record of the parameters; `rest`, how much noise is left in it.
-        past: With which it is compared.
-        f: Its force, N.
-        m: Its moment, N m.
-        shaft: As the encoders have it.
+        c: A record of the parameters.
+        d: How far before, m.
+        var_d: Its variance, m^2.
+        lever: u x f of the push, N.
+        r: Moment left, N m.
+        doubt: Standard deviation of r, N m.
     """
-    u = shaft.u
-    depth = dot(u, sub(past.p, shaft.p))
-    change = across(sub(f, past.f_0), u)
-    lever = cross(u, change)
-    r = across(along(sub(m, past.m_0), -depth, lever), u)
-    square = max(dot(lever, lever), 1e-12)
-    noise = sqrt(c.moment_noise**2 + (depth * c.force_noise) ** 2)
-    margin = c.depth * sqrt(square) + c.sure * c.rest * noise
-    return change, dot(r, lever) / square, norm(r), margin
+    size = norm(lever)
+    gain = var_d * size / (var_d * size * size + doubt * doubt)
+    d += gain * (dot(r, lever) / max(size, 1e-9) - d * size)
+    return max(d, 0.0), var_d * (1.0 - gain * size)
+
+
+@compiled
+def at_fulcrum(f: Vector, depth: float, u: Vector, df: Vector, dm: Vector) -> Wrench:
+    """A force across the shaft at the fulcrum's depth, with its noise, as a reading."""
+    return Wrench(plus(f, df), plus(scaled(depth, cross(u, f)), dm), 1.0)
 
 
 @compiled
 def watch_touch(
     c: Any, past: Past, told: Told, shaft: ShaftMotion, wrench: Wrench
-) -> tuple[Past, Wrench, Touched, Waits]:
+) -> tuple[Past, Wrench, Touched, Wrench, Waits]:
     """One reading: what is remembered, the wall's share, what pushes, who waits.
 
     Args:
-        c: As `place` has it; `part` and `slow_part`, what a reading counts.
+        c: A record of the parameters; `part` and `slow_part`, what a reading counts;
+            `rest`, how much noise is left in the smooth.
         past: What was remembered.
         told: What the estimator said.
         shaft: As the encoders have it.
@@ -154,40 +196,80 @@ def watch_touch(
     """
     nothing = Touched(_STILL, 1.0, 0.0)
     if not finite_shaft(shaft) or wrench.valid < 0.5 or not finite_wrench(wrench):
-        return past, wrench, nothing, Waits(0.0)
+        return past, wrench, nothing, wrench, Waits(0.0)
+    u = shaft.u
+    p_0 = past.p_0 if told.known > 0.5 else told.p
+    r, depth = moment_left(p_0, shaft, wrench)
+    force = across(wrench.f, u)
+    f = along(past.f, c.part, sub(force, past.f))
+    r = along(past.r, c.part, sub(r, past.r))
     if told.known < 0.5:
-        f, m = wrench.f, wrench.m
-        return Past(f, m, f, m, told.p, 0.0, 0.0, 0.0), wrench, nothing, Waits(0.0)
-    f = along(past.f, c.part, sub(wrench.f, past.f))
-    m = along(past.m, c.part, sub(wrench.m, past.m))
-    change, below, moment, margin = place(c, past, f, m, shaft)
-    touched, free = past.touched, 0.0
-    if touched < 0.5 and norm(change) > c.least and below > 0.0 and moment > margin:
-        touched = 1.0
-    elif touched > 0.5 and (moment < 0.5 * margin or norm(change) < 0.5 * c.least):
-        free = past.free + c.period
-        touched = 1.0 if free < c.release else 0.0
-    now = norm(across(sub(wrench.f, past.f_0), shaft.u))
-    held = past.held + c.period if now > c.sudden or past.held > 0.0 else 0.0
-    if norm(change) > c.wall and moment < 0.5 * margin:
-        held = max(held, c.hold)
-    if touched < 0.5 and not 0.0 < held < c.hold:
-        f_0 = along(past.f_0, c.slow_part, sub(wrench.f, past.f_0))
-        m_0 = along(past.m_0, c.slow_part, sub(wrench.m, past.m_0))
-        held = 0.0 if now < 0.5 * c.sudden else held
-        after = Past(f, m, f_0, m_0, told.p, 0.0, held, 0.0)
-        return after, wrench, nothing, Waits(0.0)
-    wall = Wrench(
-        plus(past.f_0, limited(sub(wrench.f, f), 2.0 * c.force_noise)),
-        plus(past.m_0, limited(sub(wrench.m, m), 2.0 * c.moment_noise)),
-        wrench.valid,
+        after = Past(f, r, f, r, p_0, _STILL, c.below, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return after, wrench, nothing, wrench, Waits(0.0)
+    left = sub(r, past.r_0)
+    noise = sqrt(c.moment_noise**2 + (depth * c.force_noise) ** 2)
+    doubt = c.rest * noise
+    p = along(told.p, c.period, told.v)
+    pull = scaled(told.stiffness, across(sub(p, shaft.p), u))
+    b, d, var_d = past.b, past.d, past.var_d
+    p_0 = along(p_0, c.period, told.v)
+    if past.kept < 0.5:
+        b = scaled(1.0 / told.stiffness, sub(past.f_0, pull))
+        d, var_d = c.below, c.below**2
+    wall = along(pull, told.stiffness, across(b, u))
+    push = sub(f, wall)
+    lever = cross(u, push)
+    d, var_d = placed(
+        c, d, var_d, lever, left, noise + d * told.stiffness * told.sigma_across
     )
-    after = Past(f, m, past.f_0, past.m_0, past.p, touched, held, free)
+    wrong = max(c.depth, told.sigma_along) * norm(push)
+    margin = wrong + c.sure * doubt
+    moment = dot(left, lever) / max(norm(lever), 1e-9)
+    touched, free, held = past.touched, 0.0, past.held
+    if touched > 0.5:
+        if moment < 0.5 * margin or norm(push) < 0.5 * c.least:
+            free = past.free + c.period
+            touched = 1.0 if free < c.release else 0.0
+    elif norm(push) > c.least and moment > margin:
+        touched = 1.0
+    change = norm(sub(force, wall))
+    doubtful = moment - wrong > c.suspect * doubt and norm(push) > 0.5 * c.least
+    if doubtful or change > c.sudden:
+        held += c.period
+    elif change < 0.5 * c.sudden:
+        held = 0.0
+    elif held > 0.0:
+        held += c.period
+    limit = c.hold if doubtful else c.brief
+    if touched < 0.5 and not 0.0 < held < limit:
+        f_0 = along(past.f_0, c.slow_part, sub(force, past.f_0))
+        if past.touched > 0.5:
+            f_0, held = wall, 0.0
+        r_0 = along(past.r_0, c.slow_part, left)
+        p_0 = along(p_0, c.slow_part, sub(told.p, p_0))
+        after = Past(f, r, f_0, r_0, p_0, _STILL, c.below, 0.0, 0.0, held, 0.0, 0.0)
+        return after, wrench, nothing, wrench, Waits(0.0)
+    # Its noise stays: a sensor without is not believed.
+    own_f = limited(sub(force, f), 2.0 * c.force_noise)
+    smooth_m = along(r, depth, cross(u, f))
+    own_m = limited(sub(across(wrench.m, u), smooth_m), 2.0 * c.moment_noise)
+    seen = at_fulcrum(wall, depth, u, own_f, own_m)
     if touched < 0.5:
-        return after, wall, nothing, Waits(1.0)
-    reach = max(c.length - dot(shaft.u, sub(past.p, shaft.p)), 1e-3)
-    share = min(1.0, max(0.0, below / reach))
-    return after, wall, Touched(change, share, 1.0), Waits(1.0)
+        after = Past(f, r, past.f_0, past.r_0, p_0, b, d, var_d, 0.0, held, 0.0, 1.0)
+        return after, seen, nothing, seen, Waits(1.0)
+    # With where it pushes known the moment tells the push, and what is left the wall.
+    by_moment = scaled(-1.0 / max(d, c.nearest), cross(u, left))
+    sigma = sqrt(doubt**2 + var_d * dot(by_moment, by_moment)) / max(d, c.nearest)
+    tells = d > c.nearest and sigma < told.stiffness * told.sigma_across
+    rest = seen
+    if tells:
+        rest = at_fulcrum(sub(f, by_moment), depth, u, own_f, own_m)
+        b = along(b, -c.part, b)
+    after = Past(f, r, past.f_0, past.r_0, p_0, b, d, var_d, touched, held, free, 1.0)
+    reach = max(c.length - depth, 1e-3)
+    share = min(1.0, max(0.0, d / reach))
+    touch = Touched(push, share, 1.0)
+    return after, seen, touch, rest, Waits(0.0 if tells else 1.0)
 
 
 class TouchWatch(StepBlock):
@@ -228,12 +310,13 @@ class TouchWatch(StepBlock):
         believed = self.signal_in("believed", Wrench)
         silence = flat(SILENCE)
         outputs = {"wall": Wrench, "touch": Touched}
-        gives = [Past, *outputs.values(), Waits]
+        gives = [Past, *outputs.values(), Wrench, Waits]
         taken = [ShaftMotion, Wrench]
         run = wired(watch_touch, 1, [Past, Told], taken, gives, False)
-        past = Past(_STILL, _STILL, _STILL, _STILL, _STILL, 0.0, 0.0, 0.0)
+        still = [_STILL] * 6
+        past = Past(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self.DeclareDiscreteState(flat(past))
-        self.DeclareDiscreteState(flat(Told(_STILL, 0.0)))
+        self.DeclareDiscreteState(flat(Told(_STILL, _STILL, 0.0, 0.0, 1.0, 0.0)))
 
         def calc(context: Any) -> np.ndarray:
             states = [context.get_discrete_state(k).value() for k in range(2)]
@@ -243,10 +326,16 @@ class TouchWatch(StepBlock):
         step = self.cached("step", calc, reads)
         last = size(Past)
         self._emit(step, outputs, last)
+        rest = slice(-1 - size(Wrench), -1)
 
         def calc_told(context: Any) -> np.ndarray:
             array = step.Eval(context)
-            return silence if array[-1] > 0.5 else believed.Eval(context)
+            if array[-1] > 0.5:
+                return silence
+            # What is not believed is not told, whatever of it is the wall's.
+            trusted = believed.Eval(context)
+            touched = array[last + size(Wrench) + size(Touched) - 1] > 0.5
+            return array[rest] if touched and trusted[-1] > 0.5 else trusted
 
         self.signal_out("told", Wrench, calc_told, {step.ticket(), believed.ticket()})
 
@@ -254,6 +343,14 @@ class TouchWatch(StepBlock):
             said = view(Fulcrum, estimate.Eval(context))
             probes = view(Permission, permission.Eval(context)).code == _PROBING
             known = not probes and said.sigma_ln_stiffness < params.known
-            return [step.Eval(context)[:last], np.array([*said.p, float(known)])]
+            told = Told(
+                said.p,
+                said.v,
+                said.sigma_across,
+                said.sigma_along,
+                said.stiffness,
+                float(known),
+            )
+            return [step.Eval(context)[:last], flat(told)]
 
         self.update_every(params.period, update)

@@ -40,8 +40,9 @@ def test_who_does_not_give_way_is_pushed_harder():
         ("wrist=known", "wrist='known': expected 'pwe' with touch_yield.active"),
         ("obstacle.tracked=''", "no obstacle.tracked with held_tools.active"),
         ("held_tools.contact_stiffness=5e3", "expected >= 1"),
-        ("wall_motion.breathing=[0.003, 0, 0]", "False where wall or trocar load"),
-        ("abdomen.turning_stiffness=0.3", "False where wall or trocar load"),
+        ("wall_motion.step=[0.003, 0, 0]", "the wall does more than breathe"),
+        ("wall_motion.irregular.jitter=0.1", "the wall does more than breathe"),
+        ("abdomen.turning_stiffness=0.3", "or the trocar resists turning"),
         ("instrument.bending_stiffness=5.3", "False with a shaft that bends"),
     ],
 )

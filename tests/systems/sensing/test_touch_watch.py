@@ -17,21 +17,34 @@ FOUND = example(Fulcrum)._replace(p=(0.0, 0.0, 0.0), sigma_ln_stiffness=0.05)
 PERIOD = TouchWatchParams().period
 
 
-def after(rows, probing=False):
-    """The outputs after readings: pairs of a force in N and where it acts below S."""
+def after(rows, probing=False, found=FOUND, wall=None):
+    """The outputs after readings: pairs of a force in N and where it acts below S.
+
+    Args:
+        rows: The readings.
+        probing: Whether the wrist does.
+        found: What the estimator says, who follows what the wall does.
+        wall: The wall's force beside that of each reading, N.
+    """
+    wall = np.zeros(len(rows)) if wall is None else wall
     dut = TouchWatch(TouchWatchParams(length=LENGTH))
     context = dut.CreateDefaultContext()
     code = float(Stop.PROBING) if probing else 0.0
     for name, value in (
         ("shaft", SHAFT),
-        ("estimate", FOUND),
         ("permission", Permission(1.0, code)),
     ):
         dut.GetInputPort(name).FixValue(context, flat(value))
     rng, told = np.random.default_rng(2), []
-    for force, below in rows:
-        f = (force, 0.0, 0.0)
-        m = np.multiply(below, cross(SHAFT.u, f))
+    for (force, below), borne in zip(rows, wall, strict=True):
+        f = (force + borne, 0.0, 0.0)
+        m = np.add(
+            np.multiply(below, cross(SHAFT.u, (force, 0.0, 0.0))),
+            np.multiply(DEPTH, cross(SHAFT.u, (borne, 0.0, 0.0))),
+        )
+        p = np.add(found.p, (borne / found.stiffness, 0.0, 0.0))
+        follows = flat(found._replace(p=tuple(p)))
+        dut.GetInputPort("estimate").FixValue(context, follows)
         noise = rng.normal(size=6) * np.repeat([0.05, 0.005], 3)
         read = np.array([*f, *m, 1.0])
         read[:6] += noise
@@ -77,6 +90,29 @@ def test_a_wall_that_jumps_is_no_push_and_the_estimator_is_told_of_it():
 def test_noise_alone_is_no_push():
     rows = after([(0.0, DEPTH)] * 3000)
     assert not any(view(Touched, row[0]).touched for row in rows)
+
+
+def test_a_wall_that_breathes_is_no_push_though_its_depth_is_wrong():
+    rows = after(
+        [(0.0, DEPTH)] * 1200,
+        found=FOUND._replace(p=(0.0, 0.0, 0.015), sigma_along=0.01),
+        wall=0.3 * np.sin(2.0 * np.pi * 0.25 * PERIOD * np.arange(1200)),
+    )
+    assert not any(view(Touched, row[0]).touched for row in rows)
+    heard = [view(Wrench, row[1]).valid for row in rows]
+    assert np.mean(heard) > 0.95
+
+
+def test_what_the_wall_does_meanwhile_is_told_apart_by_the_moment():
+    rows = CALM + [(1.5, DEPTH + 0.08)] * 120
+    borne = np.r_[np.zeros(150), np.linspace(0.0, 1.0, 60), np.ones(30)]
+    rows = after(rows, found=FOUND._replace(sigma_across=2e-3), wall=borne)[-20:]
+    assert all(view(Touched, row[0]).touched for row in rows)
+    told = np.mean([row[1] for row in rows], axis=0)
+    assert view(Wrench, told).valid == 1.0
+    assert view(Wrench, told).f[0] == pytest.approx(1.0, abs=0.2)
+    lever = view(Wrench, told).m[1] / view(Wrench, told).f[0]
+    assert abs(lever) == pytest.approx(DEPTH, abs=0.02)
 
 
 def test_next_to_the_trocar_it_is_the_walls():
