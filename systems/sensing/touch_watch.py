@@ -1,21 +1,25 @@
 """Touch watch: whether a tool pushes the robot's shaft, how hard, and how far down.
 
-The wrist's sensor feels the wall at the fulcrum and, if another tool comes, that one
-below it. What has changed of its smooth wrench against what it was before, f and m
-across the shaft, tells where it acts: with the fulcrum's depth lambda from the sensor
+The wrist's sensor feels the wall at the fulcrum and, if another tool comes, that one d
+below it. Of the smooth force f and moment m across the shaft, with the fulcrum's depth
+lambda from the sensor, no force of the wall's explains
 
-    r = m - lambda u x f = d u x f,
+    r = m - lambda u x f = d u x f_t,
 
-d being how far below the fulcrum. A wall that moves leaves no r but that of a depth
-that is not quite known; a push leaves one that is clear of it and of the noise, and is
-over when there is none left. While it lasts, the wall is taken to bear what it bore
-before: the shaft goes through the fulcrum that is believed.
+f_t being the push. A wall that breathes leaves no r but that of a depth that is not
+quite known, however far it goes; a push leaves one that is clear of it and of the
+noise, and is over when there is none left. The slow mean of r does not count.
 
 An estimator of the fulcrum would take a push's first newton for a jump of the wall, and
-learn from it a depth at which nothing can be told any more. So it is told nothing when
-a force comes of a sudden, until it is known what it is, nor all the time if it is a
-push: it predicts. What the wall does meanwhile is taken for the push, and a push so
-near to the trocar that its moment cannot be told is the wall's.
+learn from it a depth at which nothing can be told any more. So lambda is that of
+before, which goes on as the estimator has it move; and the estimator is told nothing
+while a moment may be a push's, or the force has jumped, until it is known what it is.
+
+A push is what exceeds the wall's pull at the predicted fulcrum, f_t = f - f_w, and
+tells d = r . (u x f_t) / |f_t|^2 (a Kalman filter of one number). With d the moment
+alone parts the two, f_t = r x u / d: where that is surer than the prediction, what is
+left is told to the estimator, and a wall that moves during the push is followed.
+A push so near to the trocar that its moment cannot be told is the wall's.
 """
 
 from dataclasses import dataclass
@@ -61,8 +65,8 @@ class Past(NamedTuple):
 
     The smooth force and moment left, N and N m; their slow means, and that of the
     fulcrum, m; by how far the estimator's is taken to be wrong, m; how far below it is
-    pushed, m, and its variance, m^2; whether something pushes; how long a moment is kept back, and how
-    long there is none left, s; 1 while b and d are kept.
+    pushed, m, and its variance, m^2; whether something pushes; for how long a moment
+    is kept back, and how long there is none left, s; 1 while b and d are kept.
     """
 
     f: Vector
@@ -115,15 +119,13 @@ class TouchWatchParams:
     )
     slow: float = parameter(0.5, "of that before", "s", above=0, most=10)
     suspect: float = parameter(
-        3.0, "standard deviations from which it is kept back", least=0, most=20
+        3.5, "standard deviations from which it is kept back", least=0, most=20
     )
     hold: float = parameter(0.3, "for so long at the most", "s", least=0, most=2)
     sudden: float = parameter(
-        0.4, "change of the force that is kept back", "N", above=0, most=5
+        0.4, "jump of the force that is kept back", "N", above=0, most=5
     )
-    brief: float = parameter(
-        0.06, "for so long without a moment", "s", least=0, most=2
-    )
+    brief: float = parameter(0.06, "for so long without a moment", "s", least=0, most=2)
     below: float = parameter(
         0.06, "where a push is expected, with that deviation", "m", above=0, most=0.3
     )
@@ -204,7 +206,8 @@ def watch_touch(
     f = along(past.f, c.part, sub(force, past.f))
     r = along(past.r, c.part, sub(r, past.r))
     if told.known < 0.5:
-        after = Past(f, r, f, r, p_0, _STILL, c.below, 0.0, 0.0, 0.0, 0.0, 0.0)
+        # What the force still does when the probe ends is no jump: as if kept back.
+        after = Past(f, r, f, r, p_0, _STILL, c.below, 0.0, 0.0, c.brief, 0.0, 0.0)
         return after, wrench, nothing, wrench, Waits(0.0)
     left = sub(r, past.r_0)
     noise = sqrt(c.moment_noise**2 + (depth * c.force_noise) ** 2)
@@ -234,7 +237,7 @@ def watch_touch(
         touched = 1.0
     change = norm(sub(force, wall))
     doubtful = moment - wrong > c.suspect * doubt and norm(push) > 0.5 * c.least
-    if doubtful or change > c.sudden:
+    if doubtful or norm(sub(force, past.f)) > c.sudden:
         held += c.period
     elif change < 0.5 * c.sudden:
         held = 0.0
