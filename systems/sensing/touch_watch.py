@@ -123,7 +123,7 @@ class TouchWatchParams:
     )
     hold: float = parameter(0.3, "for so long at the most", "s", least=0, most=2)
     sudden: float = parameter(
-        0.4, "jump of the force that is kept back", "N", above=0, most=5
+        0.6, "jump of the force that is kept back", "N", above=0, most=5
     )
     brief: float = parameter(0.06, "for so long without a moment", "s", least=0, most=2)
     below: float = parameter(
@@ -316,9 +316,7 @@ class TouchWatch(StepBlock):
         gives = [Past, *outputs.values(), Wrench, Waits]
         taken = [ShaftMotion, Wrench]
         run = wired(watch_touch, 1, [Past, Told], taken, gives, False)
-        still = [_STILL] * 6
-        past = Past(*still, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.DeclareDiscreteState(flat(past))
+        self.DeclareDiscreteState(np.zeros(size(Past)))
         self.DeclareDiscreteState(flat(Told(_STILL, _STILL, 0.0, 0.0, 1.0, 0.0)))
 
         def calc(context: Any) -> np.ndarray:
