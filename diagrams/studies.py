@@ -1,6 +1,6 @@
 """The systems that scenarios can run, and scenarios loaded by their names."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -25,19 +25,32 @@ from diagrams.common.tree import (
 from systems.common.parameter import check
 
 
-class Studies(dict[str, Any]):
-    """Studies by the systems' names; first the modules that they are in.
+class Studies(Mapping[str, Study]):
+    """Studies by the systems' names.
 
     One is imported when it is asked for: all take seconds, and a run needs one.
     """
 
+    def __init__(self, **modules: str) -> None:
+        """Makes the map, of the module of each system's `STUDY`."""
+        self._modules = modules
+
     def __getitem__(self, name: str) -> Study:
         """The study of a system."""
-        found = super().__getitem__(name)
-        if isinstance(found, str):
-            found = self[name] = import_module(found).STUDY
-        study: Study = found
+        study: Study = import_module(self._modules[name]).STUDY
         return study
+
+    def __iter__(self) -> Iterator[str]:
+        """The systems' names."""
+        return iter(self._modules)
+
+    def __len__(self) -> int:
+        """Number of systems."""
+        return len(self._modules)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such a system; nothing is imported."""
+        return name in self._modules
 
 
 STUDIES = Studies(

@@ -77,7 +77,7 @@ class Session:
         """
         study = get_study(scenario.system)
         if study.live is None:
-            able = ", ".join(name for name in STUDIES if STUDIES[name].live)
+            able = ", ".join(name for name, other in STUDIES.items() if other.live)
             raise ScenarioError(f"system={study.name!r}: expected one of {able}")
         self._study, self._live = study, study.live
         self._every = {

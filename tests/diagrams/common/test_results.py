@@ -87,7 +87,8 @@ def test_the_log_outlives_what_is_made_of_it(what, tmp_path, monkeypatch, capsys
     def broken(run):
         raise ZeroDivisionError("of nothing")
 
-    monkeypatch.setitem(STUDIES, "gauze", replace(STUDIES["gauze"], **{what: broken}))
+    study = replace(STUDIES["gauze"], **{what: broken})
+    monkeypatch.setattr("diagrams.gauze.study.STUDY", study)
     arguments = ["--duration", "0.2", "--no-replay", "--out", str(tmp_path)]
     assert main(["run", "gauze_static", *arguments]) == 1
     lines = capsys.readouterr().err.splitlines()
