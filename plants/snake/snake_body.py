@@ -40,12 +40,8 @@ TRAVEL = 4  # the translation beyond its travel
 PLATE, SHANK, BALL = 6, 7, 8
 """Parts of the body beyond its links 0 to 5; see `check_body`."""
 
-WHOLE: Any = np.int64(0)
-LAST: Any = np.int64(4)
-"""First parts of a body to be checked: all, or the last module alone.
-
-They are no literals, for each of which all would be compiled once more.
-"""
+WHOLE, LAST = 0, 4
+"""First parts of a body to be checked: all, or the last module alone."""
 
 CULPRIT = 9
 """Numbers that name what a pose met: part, point, radius, voxel, axis of a plate."""

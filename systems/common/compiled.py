@@ -28,6 +28,7 @@ import numba
 from numba.core.caching import InTreeCacheLocator, UserWideCacheLocator
 from numba.core.event import Listener, install_listener
 from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
 import numpy as np
 
 type Numbers = Sequence[float] | np.ndarray
@@ -40,12 +41,14 @@ def compiled[F: Callable[..., Any]](function: F) -> F:
     Division by zero gives an infinity or NaN, as in numpy, and the blocks test for
     them; hence no `fastmath`, which would take them for impossible.
     """
-    result = _dispatcher(function, "InTree", "UserWide")
-    result.__class__ = _Outer
-    result.inner = _dispatcher(
+    outer = _dispatcher(function, "InTree", "UserWide")
+    outer.__class__ = _Outer
+    outer.inner = _dispatcher(
         function, "InnerInTree", "InnerUserWide", no_cpython_wrapper=True
     )
-    return result
+    outer.inner.__class__ = _Inner
+    outer.inner.outer = outer
+    return outer
 
 
 class _Outer(CPUDispatcher):
@@ -60,6 +63,34 @@ class _Outer(CPUDispatcher):
     @property
     def _numba_type_(self) -> Any:
         return numba.types.Dispatcher(self.inner)
+
+
+class _Inner(CPUDispatcher):
+    """A compiled function as others call it.
+
+    Constants in a call are numbers like others: -1 in it compiles nothing anew. What
+    Python has called already, or a process before, is taken from `outer`.
+    """
+
+    outer: Any
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """What a call with arguments of these types is compiled to."""
+        plain = {name: numba.types.unliteral(kind) for name, kind in kws.items()}
+        return super().get_call_template(tuple(map(numba.types.unliteral, args)), plain)
+
+    def compile(self, sig: Any) -> Any:
+        """Compiles it for a signature that it has not been compiled for."""
+        outer, (args, _) = self.outer, normalize_signature(sig)
+        if args not in self.overloads:
+            found = outer.overloads.get(args)
+            if not found and (found := outer._cache.load_overload(sig, self.targetctx)):
+                parts = found.entry_point, found.fndesc, [found.library]
+                self.targetctx.insert_user_function(*parts)
+                outer.add_overload(found)
+            if found:
+                self.add_overload(found)
+        return super().compile(sig)
 
 
 def _dispatcher(function: Any, *locators: str, **options: Any) -> Any:

@@ -39,9 +39,6 @@ RAYS = 128
 RINGS = 64
 """Most rings of an elementary volume."""
 
-CLIPPED: Any = np.bool_(False)
-"""What is not rigid. A literal would have all compiled once more, for itself."""
-
 
 @compiled
 def meridian_rate(b: Body, beta: float) -> float:
@@ -270,7 +267,7 @@ def try_procedure(
     gain = -1
     if extend(s, b, t, node, x, why) >= 0:
         _, n = intermediate(b, x)
-        sweep_procedure(s, b, t, n, length, spacing, widest, pitch, CLIPPED, why)
+        sweep_procedure(s, b, t, n, length, spacing, widest, pitch, False, why)
         gain = s.used[0] - freed
     roll_back(s, freed, roomed)
     cut(t, nodes, visits)

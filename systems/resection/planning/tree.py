@@ -26,8 +26,8 @@ CELL = 2e-3
 
 CELLS = 1 << 14
 
-NOWHERE: Any = np.int64(-1)
-"""No node. Of a type like a node's: with another, all would be compiled twice."""
+NOWHERE = -1
+"""No node."""
 
 SHELLS = 6
 """Cells looked through around a point, in each direction, before all nodes are."""

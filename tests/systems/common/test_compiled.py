@@ -67,6 +67,35 @@ def test_what_only_compiled_functions_call_has_no_way_in_from_python():
     assert double.signatures == double.inner.signatures
 
 
+def test_what_python_has_called_is_not_compiled_again_for_others(monkeypatch):
+    @compiled
+    def double(x):
+        return 2.0 * x
+
+    @compiled
+    def quadruple(x):
+        return double(double(x))
+
+    assert double(3.0) == 6.0
+    with monkeypatch.context() as patched:
+        patched.setattr(double.inner._compiler, "compile", None)
+        assert quadruple(1.0) == 4.0
+    assert list(double.inner.overloads.values()) == list(double.overloads.values())
+
+
+def test_a_constant_in_a_call_is_a_number_like_others():
+    @compiled
+    def scaled(x, n, whole):
+        return x * n if whole else x
+
+    @compiled
+    def call(x, n):
+        return scaled(x, 3, True) + scaled(x, n, False) + scaled(x, 4, n > 1)
+
+    assert call(2.0, 5) == 16.0
+    assert len(scaled.inner.signatures) == 1
+
+
 def test_where_nothing_can_be_written_it_is_compiled_all_the_same(monkeypatch):
     def refuse(locator):
         raise OSError("read-only")
