@@ -3,7 +3,13 @@
 The hand leads the tool by springs. Its tip goes as deep and points where the hand wants
 it, held by the grip through the lever outside; where it goes through the wall a trocar
 of its own gives way sideways. All of it is native: joints with servos, and Drake's
-point contact between the shafts' capsules. The hand's wish is told at instants.
+point contact. The hand's wish is told at instants.
+
+To touch, the shaft is a row of spheres. Drake 1.58 finds the normal of two capsules
+that cross from where their centres are, and turns it along one of them where they cross
+near an end; of a sphere and a capsule it is exact. Many springs side by side are also
+what two rods are that cross: what they have in contact grows with the force, which goes
+with depth to the power of 3/2, as Hertz has it.
 
 A relaxed arm's hand has 100 to 500 N/m in the plane (Mussa-Ivaldi, Hogan and Bizzi
 1985), one that grips firmly several times that; its damping is assumed.
@@ -12,17 +18,17 @@ A relaxed arm's hand has 100 to 500 N/m in the plane (Mussa-Ivaldi, Hogan and Bi
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import asin, atan2, cos, sin
+from math import asin, atan2, cos, sin, sqrt
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.geometry import (
     AddContactMaterial,
-    Capsule,
     CollisionFilterDeclaration,
     GeometrySet,
     ProximityProperties,
+    Sphere,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import ContactModel, ContactResults, CoulombFriction
@@ -47,6 +53,8 @@ DEGREES = 5
 """Of freedom of a tool: its trocar's x and y, its tilt about x and y, its depth."""
 _LEAN = 0.02
 """Mass of a trocar that moves, kg."""
+_PITCH = 1e-3
+"""Between the spheres of a shaft, m: at 0.5 N one or two touch, at 5 N three."""
 _STILL = (0.0, 0.0, 0.0)
 read_shaft, write_shaft = reader(Shaft), writer(Shaft)
 
@@ -80,10 +88,9 @@ class HeldToolsParams:
     )
     trocar_damping: float = parameter(5.0, "of it", "N s/m", least=0.5, most=100)
     # 0.25 mm at 5 N. Real shafts bend: a tube (3 E I / l^3) has 3e3 N/m 150 mm from its
-    # trocar; but from 1 mm of penetration on Drake 1.58 turns the normal of two that
-    # cross, and they pass each other: seen with 5e3.
+    # trocar.
     contact_stiffness: float = parameter(
-        2e4, "of two shafts that touch", "N/m", least=1e4, most=1e6
+        2e4, "force by depth of two shafts at 5 N", "N/m", least=2e3, most=1e6
     )
     dissipation: float = parameter(2.0, "Hunt and Crossley's", "s/m", least=0, most=50)
     friction: float = parameter(0.1, "of wet steel on steel", least=0, most=1)
@@ -98,14 +105,24 @@ class HeldToolsParams:
         d = [self.trocar_damping] * 2 + [lever * self.grip_damping] * 2
         return np.array([*k, self.grip_stiffness]), np.array([*d, self.grip_damping])
 
+    def sphere_stiffness(self) -> float:
+        """Of each of the spheres, N/m.
+
+        Those at x along the shaft, from where another of its diameter D crosses it at
+        a right angle, are in it by d - x^2 / (2 D). Together they have K d^(3/2) of
+        force, K = 4/3 k / pitch sqrt(2 D).
+        """
+        K = self.contact_stiffness**1.5 / sqrt(5.0)
+        return 0.75 * K * _PITCH / sqrt(2.0 * self.diameter)
+
 
 @dataclass
 class HeldTool:
-    """A tool in the plant: model instance, body, shaft's geometry and fulcrum [m]."""
+    """A tool in the plant: model instance, body, shaft's spheres and fulcrum [m]."""
 
     instance: Any
     body: Any
-    shaft: Any
+    shaft: list[Any]
     p_WG: list[float]
 
 
@@ -177,15 +194,15 @@ def add_held_tool(
     plant.set_gravity_enabled(instance, False)  # the hand carries it
     material = ProximityProperties()
     friction = CoulombFriction(params.friction, params.friction)
-    AddContactMaterial(params.dissipation, params.contact_stiffness, friction, material)
+    stiffness = params.sphere_stiffness()
+    AddContactMaterial(params.dissipation, stiffness, friction, material)
     radius = 0.5 * params.diameter
-    shaft = plant.RegisterCollisionGeometry(
-        body,
-        RigidTransform([0.0, 0.0, -0.5 * params.length]),
-        Capsule(radius, params.length - 2.0 * radius),
-        f"held_{name}",
-        material,
-    )
+    shaft = [
+        plant.RegisterCollisionGeometry(
+            body, RigidTransform([0.0, 0.0, -z]), Sphere(radius), f"held_{k}", material
+        )
+        for k, z in enumerate(np.arange(radius, params.length - radius, _PITCH))
+    ]
     return HeldTool(instance, body, shaft, p_WG)
 
 
@@ -212,7 +229,7 @@ def add_held_tools(
     check(params)
     held = {name: add_held_tool(plant, name, p, params) for name, p in fulcrums.items()}
     plant.set_contact_model(ContactModel.kPoint)
-    shafts = GeometrySet([tool.shaft for tool in held.values()])
+    shafts = GeometrySet([sphere for tool in held.values() for sphere in tool.shaft])
     scene_graph.collision_filter_manager().Apply(
         CollisionFilterDeclaration().ExcludeWithin(shafts)
     )
@@ -297,8 +314,7 @@ class HeldTools(Block):
         results = self._results.Eval(context)
         forces = np.zeros((len(self._bodies), 7))
         shafts = [read_shaft(self._shaft(k, context)) for k in range(len(forces))]
-        forces[:, 3:6] = [shaft.tip for shaft in shafts]
-        load = np.zeros(6)
+        load, pressed = np.zeros(6), np.zeros(len(forces))
         for i in range(results.num_point_pair_contacts()):
             info = results.point_pair_contact_info(i)
             pair = int(info.bodyA_index()), int(info.bodyB_index())
@@ -306,9 +322,13 @@ class HeldTools(Block):
             k = self._bodies.index(pair[1] if sign > 0.0 else pair[0])
             f, p = sign * info.contact_force(), info.contact_point()
             forces[k, :3] += f
-            forces[k, 3:6] = p
+            weight = max(float(np.linalg.norm(f)), 1e-12)
+            pressed[k] += weight
+            forces[k, 3:6] += weight * p
             load[:3] -= np.cross(p, f)
             load[3:] -= f
+        forces[pressed > 0.0, 3:6] /= pressed[pressed > 0.0, None]
+        forces[pressed == 0.0, 3:6] = np.array([s.tip for s in shafts])[pressed == 0.0]
         lever = self._params.lever
         for p_WG, shaft, row in zip(self._p_WG, shafts, forces, strict=True):
             f, p = vector(row[:3]), vector(row[3:6])
