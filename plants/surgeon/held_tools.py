@@ -87,10 +87,10 @@ class HeldToolsParams:
         500.0, "lateral, of the tool's own trocar", "N/m", least=10, most=2e4
     )
     trocar_damping: float = parameter(5.0, "of it", "N s/m", least=0.5, most=100)
-    # 0.25 mm at 5 N. Real shafts bend: a tube (3 E I / l^3) has 3e3 N/m 150 mm from its
-    # trocar.
+    # The bodies are rigid, so it stands for their bending: a steel tube of 5 mm
+    # (3 E I / l^3) has 3e3 N/m 150 mm from its trocar and 1e4 at 100 mm.
     contact_stiffness: float = parameter(
-        2e4, "force by depth of two shafts at 5 N", "N/m", least=2e3, most=1e6
+        5e3, "force by depth of two shafts at 5 N", "N/m", least=2e3, most=1e6
     )
     dissipation: float = parameter(2.0, "Hunt and Crossley's", "s/m", least=0, most=50)
     friction: float = parameter(0.1, "of wet steel on steel", least=0, most=1)

@@ -8,10 +8,13 @@ place there goes with the force, through the fulcrum,
 
 A being the admittance, and f_0 the force that is borne. The task waits, with its
 reason, and goes on a while after. What leads R meanwhile is the push alone, but for a
-withdrawal along its own shaft that is under way, which takes no new room.
+withdrawal along its own shaft that is under way, which takes no new room. It gives way
+within a ball about where the push found the tip, and stands at its edge: what is taken
+for a push and is none does not lead it farther.
 """
 
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any, NamedTuple
 
 from systems.common.compiled import compiled, packed
@@ -60,6 +63,9 @@ class TouchYieldParams:
     acceleration: float = parameter(
         1.5, "of the tip, at the most", "m/s^2", above=0, most=20
     )
+    room: float = parameter(
+        0.08, "how far the tip gives way, from where it was", "m", above=0, most=0.3
+    )
     least_share: float = parameter(
         0.3, "of the shaft, above which the tip goes no faster", above=0, most=1
     )
@@ -73,10 +79,11 @@ class TouchYieldParams:
 
 
 class Yielding(NamedTuple):
-    """How fast the tip gives way, m/s; how much longer the task waits, s."""
+    """How fast the tip gives way, m/s; how much longer the task waits, s; from where, m."""
 
     v: Vector
     left: float
+    start: Vector
 
 
 @compiled
@@ -96,21 +103,27 @@ def give_way(
     still = (0.0, 0.0, 0.0)
     sound = finite_touch(touch) and finite_guide(guide) and finite_tool(robot)
     if not (sound and finite_velocity(v_safe) and finite_permission(permission)):
-        return Yielding(still, old.left), Velocity(still), permission
+        return Yielding(still, old.left, old.start), Velocity(still), permission
     s = max(guide.s, c.least_guide)
     pushed = touch.touched > 0.5
     left = c.wait if pushed else max(old.left - c.period, 0.0)
     if left <= 0.0:
-        return Yielding(still, 0.0), v_safe, permission
+        return Yielding(still, 0.0, robot.tip), v_safe, permission
+    start = old.start if old.left > 0.0 else robot.tip
     wanted = still
     if pushed:
         over = max(0.0, 1.0 - c.borne / max(norm(touch.f), 1e-9))
         rate = c.admittance * over / max(touch.share, c.least_share)
         wanted = limited(scaled(rate, touch.f), c.speed)
+        away = sub(robot.tip, start)
+        out, far = unit(away), norm(away)
+        # What can still be braked within the room.
+        fastest = sqrt(2.0 * c.acceleration * max(c.room - far, 0.0))
+        wanted = along(wanted, min(fastest - dot(wanted, out), 0.0), out)
     v = plus(old.v, limited(sub(wanted, old.v), c.acceleration * c.period))
     u = unit(sub(robot.tip, robot.fulcrum))
     v_R = Velocity(along(scaled(s, v), min(0.0, dot(v_safe.v, u)), u))
-    return Yielding(v, left), v_R, Permission(0.0, _TOUCHED)
+    return Yielding(v, left, start), v_R, Permission(0.0, _TOUCHED)
 
 
 class TouchYield(StepBlock):
@@ -145,7 +158,7 @@ class TouchYield(StepBlock):
                 "wrist": Permission,
                 "touch": Touched,
             },
-            Yielding((0.0, 0.0, 0.0), 0.0),
+            Yielding((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0)),
             {"v_R": Velocity, "permission": Permission},
             params.period,
             timed=False,

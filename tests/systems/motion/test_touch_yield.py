@@ -54,6 +54,32 @@ def test_it_starts_gently_and_has_a_limit():
     assert speeds[-1] == pytest.approx(PARAMS.speed)
 
 
+def test_it_stands_where_it_has_given_way_enough():
+    dut = TouchYield(TouchYieldParams(active=True, room=0.02))
+    context = dut.CreateDefaultContext()
+    push = Touched((0.0, 5.0, 0.0), 1.0, 1.0)
+    for name, value in (
+        ("v_safe", Velocity(ONWARDS)),
+        ("guide", example(Guide)._replace(s=1.0)),
+        ("touch", push),
+    ):
+        dut.GetInputPort(name).FixValue(context, flat(value))
+    tip, ways = np.array(TOOL.tip), []
+    for k in range(120):
+        # Its first answer is to a tool that nothing pushes.
+        told = push if k > 0 else push._replace(touched=0.0)
+        dut.GetInputPort("touch").FixValue(context, flat(told))
+        place = RobotTool(TOOL.fulcrum, tuple(tip))
+        dut.GetInputPort("robot_tool").FixValue(context, flat(place))
+        v = view(Velocity, dut.GetOutputPort("v_R").Eval(context)).v if k > 0 else 0.0
+        tip = tip + np.multiply(v, 1.0 / 60.0)
+        update = dut.EvalUniquePeriodicDiscreteUpdate(context)
+        context.get_mutable_discrete_state().SetFrom(update)
+        ways.append(np.linalg.norm(tip - TOOL.tip))
+    assert 0.018 < ways[-1] < 0.022 and max(ways) < 0.0225
+    assert ways[-1] == pytest.approx(ways[-2], abs=1e-4)
+
+
 def test_a_withdrawal_goes_on():
     (v, _), *_ = steps([Touched((0.0, 0.2, 0.0), 0.5, 1.0)], v_safe=(0.02, 0.0, 0.05))
     assert v[2] == pytest.approx(0.1)
