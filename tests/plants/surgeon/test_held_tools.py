@@ -119,6 +119,63 @@ def test_the_force_told_is_the_one_that_bends_the_hands_springs():
     assert abs(force.p[0] - BAR[0]) < 0.004 and abs(force.p[2] - BAR[2]) < 0.004
 
 
-def test_capsules_so_soft_that_they_pass_each_other_are_refused():
-    with pytest.raises(ValueError, match="contact_stiffness"):
-        HeldTools({}, {}, HeldToolsParams(contact_stiffness=5e3))
+def crossed(params, along_tool, along_bar, depth, turn=0.5 * np.pi):
+    """Force on the bar [N] and the normal from tool to bar, where the two cross.
+
+    Args:
+        params: Of the tool, which hangs from the origin along -z.
+        along_tool: From its tip [m], to where they cross.
+        along_bar: From the bar's end [m].
+        depth: How far they are into each other [m].
+        turn: Between the two [rad].
+    """
+    builder = DiagramBuilder()
+    plant, scene = add_plant_and_scene(builder)
+    held = add_held_tools(plant, scene, {"obstacle": [0.0, 0.0, 0.0]}, params)
+    # The bar's z goes from the crossing along x, turned towards the tool's.
+    u = np.array([np.sin(turn), 0.0, np.cos(turn)])
+    at = np.array([0.0, params.diameter - depth, along_tool - 0.1])
+    middle = at + u * (along_bar - 0.15)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(),
+        RigidTransform(RotationMatrix.MakeYRotation(turn), middle),
+        Capsule(0.5 * params.diameter, 0.3),
+        "bar",
+        CoulombFriction(0.1, 0.1),
+    )
+    plant.Finalize()
+    connect_poses(builder, plant, scene, touches=True)
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    context = plant.GetMyContextFromRoot(root)
+    plant.SetPositions(context, held["obstacle"].instance, [0.0, 0.0, 0.0, 0.0, 0.1])
+    results = plant.get_contact_results_output_port().Eval(context)
+    bodies = {int(held["obstacle"].body.index())}
+    force, normals = np.zeros(3), []
+    for i in range(results.num_point_pair_contacts()):
+        info = results.point_pair_contact_info(i)
+        sign = 1.0 if int(info.bodyA_index()) in bodies else -1.0
+        force += sign * info.contact_force()
+        normals.append(-sign * info.point_pair().nhat_BA_W)
+    return force, np.array(normals)
+
+
+@pytest.mark.parametrize("depth", [2e-4, 5e-4, 1e-3])
+def test_crossed_shafts_press_each_other_as_hertz_has_it(depth):
+    params = HeldToolsParams(active=True)
+    deepest = 5.0 / params.contact_stiffness  # at 5 N, by what the parameter says
+    expected = 5.0 * (depth / deepest) ** 1.5
+    for shift in (0.0, 2.5e-4, 5e-4):
+        force, _ = crossed(params, 0.06 + shift, 0.1, depth)
+        # Deep in, the outer ones push aslant.
+        assert force[1] == pytest.approx(expected, rel=0.15)
+        assert np.hypot(force[0], force[2]) < 0.1 * expected
+
+
+@pytest.mark.parametrize("along_bar", [0.0, 0.005, 0.012])
+@pytest.mark.parametrize("turn", [0.5, 1.0, 2.0])
+def test_near_an_end_they_push_each_other_apart_and_not_along(along_bar, turn):
+    params = HeldToolsParams(active=True)
+    force, normals = crossed(params, 0.06, along_bar, 5e-4, turn)
+    assert len(normals) and np.all(normals[:, 1] > 0.75)
+    assert np.linalg.norm(force[[0, 2]]) < 0.2 * force[1]
