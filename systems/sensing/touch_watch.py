@@ -327,16 +327,19 @@ class TouchWatch(StepBlock):
         step = self.cached("step", calc, reads)
         last = size(Past)
         self._emit(step, outputs, last)
-        rest = slice(-1 - size(Wrench), -1)
+        begin = last + size(Wrench)
+        felt = slice(begin, begin + size(Touched))
+        rest = slice(felt.stop, felt.stop + size(Wrench))
 
         def calc_told(context: Any) -> np.ndarray:
             array = step.Eval(context)
-            if array[-1] > 0.5:
+            if view(Waits, array[rest.stop :]).waits > 0.5:
                 return silence
             # What is not believed is not told, whatever of it is the wall's.
             trusted = believed.Eval(context)
-            touched = array[last + size(Wrench) + size(Touched) - 1] > 0.5
-            return array[rest] if touched and trusted[-1] > 0.5 else trusted
+            touched = view(Touched, array[felt]).touched > 0.5
+            valid = view(Wrench, trusted).valid > 0.5
+            return array[rest] if touched and valid else trusted
 
         self.signal_out("told", Wrench, calc_told, {step.ticket(), believed.ticket()})
 
