@@ -53,8 +53,10 @@ DEGREES = 5
 """Of freedom of a tool: its trocar's x and y, its tilt about x and y, its depth."""
 _LEAN = 0.02
 """Mass of a trocar that moves, kg."""
-_PITCH = 1e-3
+_PITCH = 2e-3
 """Between the spheres of a shaft, m: at 0.5 N one or two touch, at 5 N three."""
+_INSIDE = 0.2
+"""What can be inside the patient, from the tip, m: that much of a shaft can touch."""
 _STILL = (0.0, 0.0, 0.0)
 read_shaft, write_shaft = reader(Shaft), writer(Shaft)
 
@@ -89,8 +91,9 @@ class HeldToolsParams:
     trocar_damping: float = parameter(5.0, "of it", "N s/m", least=0.5, most=100)
     # The bodies are rigid, so it stands for their bending: a steel tube of 5 mm
     # (3 E I / l^3) has 3e3 N/m 150 mm from its trocar and 1e4 at 100 mm.
+    # With a stiffer one the grain of the row is felt.
     contact_stiffness: float = parameter(
-        5e3, "force by depth of two shafts at 5 N", "N/m", least=2e3, most=1e6
+        5e3, "force by depth of two shafts at 5 N", "N/m", least=2e3, most=1e4
     )
     dissipation: float = parameter(2.0, "Hunt and Crossley's", "s/m", least=0, most=50)
     friction: float = parameter(0.1, "of wet steel on steel", least=0, most=1)
@@ -201,7 +204,7 @@ def add_held_tool(
         plant.RegisterCollisionGeometry(
             body, RigidTransform([0.0, 0.0, -z]), Sphere(radius), f"held_{k}", material
         )
-        for k, z in enumerate(np.arange(radius, params.length - radius, _PITCH))
+        for k, z in enumerate(np.arange(radius, min(params.length, _INSIDE), _PITCH))
     ]
     return HeldTool(instance, body, shaft, p_WG)
 

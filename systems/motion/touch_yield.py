@@ -79,7 +79,7 @@ class TouchYieldParams:
 
 
 class Yielding(NamedTuple):
-    """How fast the tip gives way, m/s; how long the task waits yet, s; from where, m."""
+    """How fast the tip gives way, m/s; how long the task still waits, s; whence, m."""
 
     v: Vector
     left: float
