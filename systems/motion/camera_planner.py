@@ -49,8 +49,8 @@ from systems.common.signals import (
 from systems.common.step_block import StepBlock
 from systems.motion.camera_way import (
     THERE,
+    expected_loss,
     least_margin,
-    lost_on_way,
     seen_from,
     way_clear,
 )
@@ -144,17 +144,14 @@ def best_place(
                     continue
                 view = ViewCone(place, u, scope.half_angle)
                 margin = least_margin(view, shafts, later, organs, enough)
-                lost = 0.0 if margin > 0.0 else params.horizon
-                if lost > shortest:
-                    continue
                 good, was_good = margin >= enough, most >= enough
                 better = margin > most
                 if good or was_good:
                     better = good and (way < least or not was_good)
-                if lost >= shortest and not better:
+                if shortest <= 0.0 and not better:
                     continue
-                lost += lost_on_way(
-                    scope, p, place, params.horizon, shafts, later, organs
+                lost = expected_loss(
+                    scope, p, place, params.horizon, shafts, later, organs, shortest
                 )
                 if lost > shortest or (lost >= shortest and not better):
                     continue
@@ -221,9 +218,8 @@ def _update(
         # On the way it counts what will be seen from where it goes to.
         there = goal if moves > 0.5 else camera.p
         here = least_margin(seen_from(scope, there), shafts, later, organs, enough)
-        lost = 0.0 if here > 0.0 else params.horizon
-        lost += lost_on_way(
-            scope, camera.p, there, params.horizon, shafts, later, organs
+        lost = expected_loss(
+            scope, camera.p, there, params.horizon, shafts, later, organs, 1e3
         )
         waited += scope.period
         if (here < needed or lost > 0.0) and waited >= params.look_period:

@@ -6,7 +6,7 @@ fulcrum; and what counts on the way is where both are at the time, in between as
 the ray from the lens to a tip sweeps triangles, too, and nothing may cross them.
 """
 
-from math import log
+from math import exp
 from typing import Any
 
 import numpy as np
@@ -31,8 +31,8 @@ SCOPE = 0.005
 """Radius of the endoscope, m."""
 THERE = 0.002
 """So near to its place the camera has arrived, m."""
-_PARTS = 6
-"""Of the way, looked at one by one."""
+PARTS = 5
+"""Of the time ahead, looked at one by one."""
 
 
 @compiled
@@ -72,21 +72,22 @@ def least_margin(
 
 
 @compiled
-def time_to(scope: Any, way: float, rest: float) -> float:
-    """When the camera, at rest first, has only `rest` of a way before it, s.
+def share_at(scope: Any, way: float, time: float) -> float:
+    """What share of a way the camera, at rest first, has gone after a time in s.
 
     It goes at `max_speed` and, near the end, at `rate` times what is left.
     """
-    slow = scope.max_speed / scope.rate
-    begun = 0.5 * min(scope.max_speed, scope.rate * way) / scope.max_acceleration
-    if rest >= slow:
-        return begun + (way - rest) / scope.max_speed
-    fast = max(0.0, way - slow) / scope.max_speed
-    return begun + fast + log(min(way, slow) / rest) / scope.rate
+    slow = min(way, scope.max_speed / scope.rate)
+    begun = 0.5 * scope.rate * slow / scope.max_acceleration
+    time = max(0.0, time - begun)
+    fast = (way - slow) / scope.max_speed
+    if time <= fast:
+        return scope.max_speed * time / way
+    return 1.0 - slow / way * exp(-scope.rate * (time - fast))
 
 
 @compiled
-def lost_on_way(
+def expected_loss(
     scope: Any,
     p: Vector,
     place: Vector,
@@ -94,8 +95,11 @@ def lost_on_way(
     shafts: np.ndarray,
     later: np.ndarray,
     organs: Organs,
+    most: float,
 ) -> float:
-    """How long a tip is lost while the camera goes from p to a place, s.
+    """How long a tip is lost till the horizon if the camera goes to a place, s.
+
+    In the mean over when the tools stop.
 
     Args:
         scope: The endoscope's parameters.
@@ -105,26 +109,31 @@ def lost_on_way(
         shafts: Tools, rows of fulcrum and tip (n, 6), R first, then S, m.
         later: The same at the horizon.
         organs: The organs.
+        most: More is of no interest, s.
     """
     away = sub(place, p)
     way = norm(away)
-    if way < THERE:
-        return 0.0
-    lost, before, time_before, then_before = 0.0, p, 0.0, shafts
-    for k in range(1, _PARTS + 1):
-        share = k / _PARTS
-        time = time_to(scope, way, max(THERE, (1.0 - share) * way))
-        at = along(p, share, away)
-        then = shafts + min(1.0, time / max(horizon, 1e-3)) * (later - shafts)
-        seen = least_margin(seen_from(scope, at), then, then, organs, 0.01) > 0.0
-        for i in range(2):
-            tip = row_of(then[:, 3:], i)
-            if seen and crossed(tip, i, before, at, then_before, then):
-                seen = False
-        if not seen:
-            lost += time - time_before
-        before, time_before, then_before = at, time, then
-    return lost
+    dt = horizon / PARTS
+    total, limit = 0.0, most * (PARTS + 1.0) / dt
+    for stop in range(PARTS, -1, -1):
+        before = p
+        was = shafts
+        for j in range(1, PARTS + 1):
+            share = share_at(scope, way, j * dt) if way > THERE else 0.0
+            at = along(p, share, away)
+            part = min(j, stop) / PARTS
+            then = shafts + part * (later - shafts)
+            seen = least_margin(seen_from(scope, at), then, then, organs, 0.02) > 0.01
+            for i in range(2):
+                tip = row_of(then[:, 3:], i)
+                if seen and crossed(tip, i, before, at, was, then):
+                    seen = False
+            if not seen:
+                total += 1.0
+                if total > limit:
+                    return 1e9
+            before, was = at, then
+    return total * dt / (PARTS + 1.0)
 
 
 @compiled
