@@ -1,13 +1,14 @@
 """Camera planner: an endoscope that keeps both tips in view, and moves only if it must.
 
 Section 2.1 follows S with the camera and nothing else. Here the camera stands still
-while both tips, R's and S's, are seen with some margin now and, as S and the obstacles
-go on, a moment later (`sight`). If not, places are tried: aims round the middle of the
-tips, at several depths through the camera's own fulcrum. Of those that are good enough
-the nearest is taken, else the best one; the camera's own shaft keeps clear of organs
-and tools there and on the way. It goes as `Endoscope` does, slowly. While R is at S,
-where the surgeon works, less margin will do. The picture's upright is the world's: no
-roll.
+while both tips, R's and S's, are seen with some margin, wherever S and the obstacles
+stop on the way that they are on (`sight: swept_margin`). If not, places are tried: aims
+round the middle of the tips, at several depths through the camera's own fulcrum. What
+counts first is how long a tip will be lost on the way and there, in the mean over when
+the tools stop (`camera_way: expected_loss`); among equals those that are good enough,
+and of them the nearest. The camera's own shaft keeps clear of organs and tools there
+and on the way. It goes as `Endoscope` does, slowly. While R is at S, where the surgeon
+works, less margin will do. The picture's upright is the world's: no roll.
 """
 
 from collections.abc import Sequence
@@ -66,7 +67,7 @@ _NEAR = 0.05
 _FARTHEST = 0.025
 """S is not thought to go farther while the camera looks ahead, m."""
 _SURE = 2.0
-"""A tool that goes slower than so many standard deviations stands."""
+"""So many standard deviations of a velocity count as its error."""
 
 
 @dataclass
@@ -111,7 +112,7 @@ def best_place(
     organs: Organs,
     enough: float,
 ) -> tuple[Vector, float, float]:
-    """Where the camera's tip should be, m, the margin there, rad, the time lost, s.
+    """Where the camera's tip should be, m, the margin there, rad, and the loss, s.
 
     Args:
         params: Of the planner.

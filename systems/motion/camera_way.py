@@ -1,9 +1,11 @@
 """The way of a camera to another place: what is seen on it, and whether it is clear.
 
-A tool goes from where it is towards where it is expected, at any pace: it may stop on
-the way. So what counts at the place is all that its shaft sweeps, a triangle under its
-fulcrum; and what counts on the way is where both are at the time, in between as well:
-the ray from the lens to a tip sweeps triangles, too, and nothing may cross them.
+A tool goes from where it is towards where it is expected, and may stop anywhere: hands
+slow down sooner than a straight line of constant speed says, and where they stop is
+not known. So a place is judged by all that a shaft sweeps, a triangle under its
+fulcrum, and a way by where camera and tools are at each time, for every part of the
+time ahead in which the tools may stop. Between two times the ray from the lens to a tip
+sweeps a triangle, too: what goes through that has hidden the tip.
 """
 
 from math import exp
@@ -31,6 +33,8 @@ SCOPE = 0.005
 """Radius of the endoscope, m."""
 THERE = 0.002
 """So near to its place the camera has arrived, m."""
+_BARELY = 0.01
+"""With less a tip counts as lost: tools and camera are not just where expected, rad."""
 PARTS = 5
 """Of the time ahead, looked at one by one."""
 
@@ -99,7 +103,7 @@ def expected_loss(
 ) -> float:
     """How long a tip is lost till the horizon if the camera goes to a place, s.
 
-    In the mean over when the tools stop.
+    The mean over when all tools stop: at once, after each part of the time, or never.
 
     Args:
         scope: The endoscope's parameters.
@@ -123,7 +127,8 @@ def expected_loss(
             at = along(p, share, away)
             part = min(j, stop) / PARTS
             then = shafts + part * (later - shafts)
-            seen = least_margin(seen_from(scope, at), then, then, organs, 0.02) > 0.01
+            view = seen_from(scope, at)
+            seen = least_margin(view, then, then, organs, 2.0 * _BARELY) > _BARELY
             for i in range(2):
                 tip = row_of(then[:, 3:], i)
                 if seen and crossed(tip, i, before, at, was, then):
