@@ -78,7 +78,7 @@ def test_what_is_swept_between_two_places_hides_though_both_ends_do_not():
 
 def test_the_reckoned_way_is_the_one_that_the_camera_goes():
     scope = EndoscopeParams(p_WG=[0.0, 0.0, 0.1], p_WS=[0.0, 0.0, -0.1])
-    record, way, period = constants(scope)[0], 0.06, scope.period
+    record, way, period = constants(scope)[0], 0.045, scope.period
     p, v = (0.0, 0.0, -0.1), (0.0, 0.0, 0.0)
     looked_at = (0.0, 0.0, p[2] - way - scope.standoff)
     for k in range(180):
