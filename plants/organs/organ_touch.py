@@ -51,8 +51,8 @@ class OrganTouchParams:
     """How touch is computed."""
 
     period: float = parameter(1 / 60, "of the force", "s", above=0.0, most=0.1)
-    # CENIC takes what acts from outside as linear in the plant's velocity, anew in each
-    # step, even where it is nothing: a quarter of a run's time.
+    # A wire to the plant's applied forces costs a quarter of a run's time, even where
+    # they are nothing.
     acts: bool = parameter(
         True, "whether tissue pushes back; else the first touch ends the run"
     )
