@@ -22,6 +22,7 @@ WIRES = [
     *(("organs.y0", f"{block}.organs") for block in AMONG),
     ("organ_touch.applied", "plant.applied_spatial_force"),
 ]
+"""The last of them only where tissue pushes back."""
 EXPORTS = {
     "organs.touch": "organ_touch.touch",
     "organs.gaps": "organ_touch.gaps",
@@ -99,7 +100,7 @@ def add_press(builder: Any, scenario: Any, organs: OrganSet) -> dict[str, Any]:
 
 def wired(scenario: Any, wires: list[tuple[str, str]]) -> list[tuple[str, str]]:
     """A diagram's wires with those of the organs, which take the place of some."""
-    wires = wires + WIRES
+    wires = wires + (WIRES if scenario.organ_touch.acts else WIRES[:-1])
     if scenario.press.active:
         taken = {sink for _, sink in PRESS_WIRES}
         wires = [wire for wire in wires if wire[1] not in taken] + PRESS_WIRES

@@ -208,6 +208,8 @@ def organ_rules(scenario: GauzeScenario) -> Rules:
             surface_of(organ)
     press = scenario.press.active
     yield not press or bool(scenario.organs), "organs", "one to press on: press.active"
+    felt = not press or scenario.organ_touch.acts
+    yield felt, "organ_touch.acts", "true with press.active, which feels the tissue"
     sensed = not press or scenario.emulated
     yield sensed, "wrist", "'pwe' with press.active, whose force loop needs its sensor"
     alone = not (press and scenario.tip_load.active)

@@ -51,6 +51,11 @@ class OrganTouchParams:
     """How touch is computed."""
 
     period: float = parameter(1 / 60, "of the force", "s", above=0.0, most=0.1)
+    # A wire to the plant's applied forces costs a quarter of a run's time, even where
+    # they are nothing.
+    acts: bool = parameter(
+        True, "whether tissue pushes back; else the first touch ends the run"
+    )
 
 
 @compiled
@@ -178,6 +183,7 @@ class OrganTouch(Block):
         params = params or OrganTouchParams()
         check(params)
         self._body, self._period = BodyIndex(robot.frame), params.period
+        self._acts = params.acts
         low, high = sorted(robot.ends[:, 2].tolist())
         # The capsule's surface ends at the tip.
         shape = np.array([low, high + robot.radius, robot.radius])
@@ -223,6 +229,11 @@ class OrganTouch(Block):
         dt = self._period if time > 0.0 else 0.0
         told = (*self._constants, *tool, self._tissue, before, dt)
         out = touch(*told)
+        if out[6] > 0.0 and not self._acts:
+            raise RuntimeError(
+                f"the tool touches an organ at {time:.3f} s, {1e3 * out[6]:.2f} mm "
+                "deep; expected none with organ_touch.acts=false: set it to true"
+            )
         next_look = time + out[-1] / _FASTEST
         return [out[:7], out[7:-2], np.array([out[-2], *out[:3], next_look])]
 

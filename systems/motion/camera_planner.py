@@ -1,13 +1,14 @@
 """Camera planner: an endoscope that keeps both tips in view, and moves only if it must.
 
 Section 2.1 follows S with the camera and nothing else. Here the camera stands still
-while both tips, R's and S's, are seen with some margin now and, as S and the obstacles
-go on, a moment later (`sight`). If not, places are tried: aims round the middle of the
-tips, at several depths through the camera's own fulcrum. Of those that are good enough
-the nearest is taken, else the best one; the camera's own shaft keeps clear of organs
-and tools there and on the way. It goes as `Endoscope` does, slowly. While R is at S,
-where the surgeon works, less margin will do. The picture's upright is the world's: no
-roll.
+while both tips, R's and S's, are seen with some margin, wherever S and the obstacles
+stop on the way that they are on (`sight: swept_margin`). If not, places are tried: aims
+round the middle of the tips, at several depths through the camera's own fulcrum. What
+counts first is how long a tip will be lost on the way and there, in the mean over when
+the tools stop (`camera_way: expected_loss`); among equals those that are good enough,
+and of them the nearest. The camera's own shaft keeps clear of organs and tools there
+and on the way. It goes as `Endoscope` does, slowly. While R is at S, where the surgeon
+works, less margin will do. The picture's upright is the world's: no roll.
 """
 
 from collections.abc import Sequence
@@ -17,13 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from plants.organs.distance import Organs, shaft_distance
+from plants.organs.distance import Organs
 from plants.organs.organs import OrganSet, arrays
 from systems.common.compiled import compiled, packed
 from systems.common.geometry import (
     along,
     any_perpendicular,
-    closest_points,
     cross,
     limited,
     norm,
@@ -48,6 +48,13 @@ from systems.common.signals import (
     usable,
 )
 from systems.common.step_block import StepBlock
+from systems.motion.camera_way import (
+    THERE,
+    expected_loss,
+    least_margin,
+    seen_from,
+    way_clear,
+)
 from systems.motion.endoscope import EndoscopeParams, wanted_tip
 from systems.motion.endoscope import constants as endoscope_constants
 from systems.motion.sight import Sight, tip_margin
@@ -55,16 +62,12 @@ from systems.motion.sight import Sight, tip_margin
 _DEPTHS = 7
 _AIMS = (-0.045, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045)
 """Aims stand round the middle of the tips, across the view, m."""
-_SCOPE = 0.005
-"""Radius of the endoscope, m."""
 _NEAR = 0.05
 """The farther tip is this far from the lens at least, m."""
 _FARTHEST = 0.025
 """S is not thought to go farther while the camera looks ahead, m."""
-_HIDDEN = 4.0
-"""What a way counts on which a tip is lost from sight."""
-_THERE = 0.002
-"""So near to its place the camera has arrived, m."""
+_SURE = 2.0
+"""So many standard deviations of a velocity count as its error."""
 
 
 @dataclass
@@ -100,77 +103,32 @@ class CameraPlannerParams:
 
 
 @compiled
-def least_margin(
-    view: ViewCone,
-    p_R: Vector,
-    p_S: Vector,
-    shafts: np.ndarray,
-    later: np.ndarray,
-    organs: Organs,
-    enough: float,
-) -> float:
-    """The least margin of both tips, now and later; S is the second row of `shafts`."""
-    margin = tip_margin(view, p_R, shafts, organs, enough)
-    if margin > 0.0:
-        margin = min(margin, tip_margin(view, p_S, shafts, organs, enough))
-    if margin > 0.0:
-        p = row_of(later[:, 3:], 1)
-        margin = min(margin, tip_margin(view, p, later, organs, enough))
-        margin = min(margin, tip_margin(view, p_R, later, organs, enough))
-    return margin
-
-
-@compiled
-def own_shaft_clear(
-    g: Vector, p: Vector, shafts: np.ndarray, organs: Organs, room: float
-) -> bool:
-    """Whether the endoscope from g to p keeps `room` from tools and organs, m."""
-    for i in range(len(shafts)):
-        a, b = row_of(shafts[:, :3], i), row_of(shafts[:, 3:], i)
-        if closest_points(g, p, a, b).distance < _SCOPE + 0.0025 + room:
-            return False
-    for k in range(len(organs.table)):
-        if shaft_distance(organs, k, g, p, 0.02)[0] < _SCOPE + room:
-            return False
-    return True
-
-
-@compiled
-def _seen_from(scope: Any, p: Vector) -> ViewCone:
-    return ViewCone(p, unit(sub(p, xyz(scope.p_WG, 0))), scope.half_angle)
-
-
-@compiled
 def best_place(
     params: Any,
     scope: Any,
     p: Vector,
-    p_R: Vector,
-    p_S: Vector,
     shafts: np.ndarray,
     later: np.ndarray,
     organs: Organs,
     enough: float,
-) -> tuple[Vector, float]:
-    """Where the camera's tip should be, m, and the margin there, rad.
+) -> tuple[Vector, float, float]:
+    """Where the camera's tip should be, m, the margin there, rad, and the loss, s.
 
     Args:
         params: Of the planner.
         scope: Of the endoscope.
         p: Where it is, m.
-        p_R: R's tip, m.
-        p_S: S's tip, m.
         shafts: Tools, rows of fulcrum and tip (n, 6), R first, then S, m.
         later: The same at the horizon.
         organs: The organs.
         enough: A place with such a margin is good, rad.
     """
     g = xyz(scope.p_WG, 0)
-    middle = scaled(0.5, plus(p_R, p_S))
+    middle = scaled(0.5, plus(row_of(shafts[:, 3:], 0), row_of(shafts[:, 3:], 1)))
     axis = unit(sub(middle, g))
     e1 = any_perpendicular(axis)
     e2 = cross(axis, e1)
-    best, least, most = p, 1e9, -1.0
+    best, least, most, shortest = p, 1e9, -1.0, 1e9
     apart = norm(sub(middle, g))
     for x in _AIMS:
         for y in _AIMS:
@@ -183,30 +141,31 @@ def best_place(
                     continue
                 place = along(g, q, u)
                 way = norm(sub(place, p))
-                if most >= enough and way >= least:
+                if shortest <= 0.0 and most >= enough and way >= least:
                     continue
                 view = ViewCone(place, u, scope.half_angle)
-                margin = least_margin(view, p_R, p_S, shafts, later, organs, enough)
-                is_better = margin >= enough and way < least
-                if most < enough:
-                    is_better = is_better or margin > most
-                if not is_better:
+                margin = least_margin(view, shafts, later, organs, enough)
+                good, was_good = margin >= enough, most >= enough
+                better = margin > most
+                if good or was_good:
+                    better = good and (way < least or not was_good)
+                if shortest <= 0.0 and not better:
                     continue
-                half = scaled(0.5, plus(place, p))
-                # On the way, when it will be half done: is a tip lost from sight?
-                done = 0.5 * way / scope.max_speed / max(params.horizon, 1e-3)
-                then = shafts + min(1.0, done) * (later - shafts)
-                seen = _seen_from(scope, half)
-                if least_margin(seen, p_R, p_S, then, then, organs, enough) <= 0.0:
-                    way *= _HIDDEN
-                    if most >= enough and way >= least:
-                        continue
-                room = params.clearance
-                if own_shaft_clear(g, place, shafts, organs, room) and own_shaft_clear(
-                    g, half, shafts, organs, 0.5 * room
-                ):
-                    best, least, most = place, way, margin
-    return best, most
+                lost = expected_loss(
+                    scope, p, place, params.horizon, shafts, later, organs, shortest
+                )
+                if lost > shortest or (lost >= shortest and not better):
+                    continue
+                if way_clear(g, p, place, shafts, later, organs, params.clearance):
+                    best, least, most, shortest = place, way, margin, lost
+    return best, most, shortest
+
+
+@compiled
+def known_velocity(tool: Estimate) -> Vector:
+    """The part of a tool's velocity that is not its error, m/s."""
+    speed = norm(tool.v)
+    return scaled(max(0.0, 1.0 - _SURE * tool.sigma_v / max(speed, 1e-9)), tool.v)
 
 
 @compiled
@@ -215,7 +174,8 @@ def shafts_of(
 ) -> np.ndarray:
     """Tools as rows of fulcrum and tip (n, 6), R first, then S; `ahead` s later."""
     rows = np.empty((2 + len(obstacles), 6))
-    goes = limited(scaled(ahead, target.v), _FARTHEST)  # it stops where it works
+    # S stops where it works.
+    goes = limited(scaled(ahead, known_velocity(target)), _FARTHEST)
     for i in range(3):
         rows[0, i], rows[0, 3 + i] = robot.fulcrum[i], robot.tip[i]
         rows[1, i] = target.fulcrum[i]
@@ -223,7 +183,7 @@ def shafts_of(
         for k in range(len(obstacles)):
             tool = read_estimate(obstacles[k])
             rows[2 + k, i] = tool.fulcrum[i]
-            rows[2 + k, 3 + i] = tool.p[i] + ahead * tool.v[i]
+            rows[2 + k, 3 + i] = tool.p[i] + ahead * known_velocity(tool)[i]
     return rows
 
 
@@ -257,25 +217,20 @@ def _update(
         on_robot = tip_margin(view, robot.tip, shafts, organs, enough)
         on_target = tip_margin(view, target.p, shafts, organs, enough)
         # On the way it counts what will be seen from where it goes to.
-        ahead = _seen_from(scope, goal) if moves > 0.5 else view
-        here = least_margin(ahead, robot.tip, target.p, shafts, later, organs, enough)
+        there = goal if moves > 0.5 else camera.p
+        here = least_margin(seen_from(scope, there), shafts, later, organs, enough)
+        lost = expected_loss(
+            scope, camera.p, there, params.horizon, shafts, later, organs, 1e3
+        )
         waited += scope.period
-        if here < needed and waited >= params.look_period:
+        if (here < needed or lost > 0.0) and waited >= params.look_period:
             waited = 0.0
-            found, margin = best_place(
-                params,
-                scope,
-                camera.p,
-                robot.tip,
-                target.p,
-                shafts,
-                later,
-                organs,
-                enough,
+            found, margin, less = best_place(
+                params, scope, camera.p, shafts, later, organs, enough
             )
-            if margin > here + params.gain:
+            if less < lost or (less <= lost and margin > here + params.gain):
                 goal, moves = found, 1.0
-        if norm(sub(goal, camera.p)) < _THERE:
+        if norm(sub(goal, camera.p)) < THERE:
             moves = 0.0
         if moves > 0.5:
             away = sub(goal, camera.p)
@@ -286,14 +241,14 @@ def _update(
     g = xyz(scope.p_WG, 0)
     q = max(scope.min_insertion, norm(sub(p, g)))
     p = along(g, q, unit(sub(p, g)))
-    view = _seen_from(scope, p)
+    view = seen_from(scope, p)
     after = Estimate(p, v, none, g, 0.0, 0.0, 0.0, 1.0, 0.0)
     soon = p
     if moves > 0.5:
         soon = along(p, 1.0 - exp(-scope.rate), sub(goal, p))
     status = Sight(on_robot, on_target, moves)
     told = np.array((goal[0], goal[1], goal[2], waited))
-    return view, Shaft(p, view.u), after, _seen_from(scope, soon), status, told
+    return view, Shaft(p, view.u), after, seen_from(scope, soon), status, told
 
 
 class CameraPlanner(StepBlock):

@@ -19,6 +19,7 @@ from systems.common.geometry import (
     norm,
     over,
     row_of,
+    segment_triangle_distance,
     sub,
 )
 from systems.common.signal import Field, Vector
@@ -31,6 +32,8 @@ _BEFORE_LENS = 0.01
 _BEFORE_TIP = 0.008
 """What is nearer to the lens, or to the tip, does not count, m."""
 _STEP = 0.002
+_STILL = 1e-4
+"""A tool that goes less far stands, m."""
 
 
 class Sight(NamedTuple):
@@ -78,6 +81,59 @@ def organ_margin(view: ViewCone, p: Vector, organs: Organs, enough: float) -> fl
             return margin
         t += max(_STEP, room - enough * t)
     return margin
+
+
+@compiled
+def swept_margin(
+    view: ViewCone,
+    own: int,
+    tips: np.ndarray,
+    shafts: np.ndarray,
+    later: np.ndarray,
+    organs: Organs,
+    enough: float,
+) -> float:
+    """Margin of a tip wherever the other tools go from `shafts` to `later`, rad.
+
+    A shaft sweeps a triangle under its fulcrum. Where the ray goes through that, the
+    tip is hidden for a while, wherever the shaft is now.
+
+    Args:
+        view: What the camera sees.
+        own: Whose tip it is: a row of the tools.
+        tips: Where that tool is (n, 6), m; its own way does not count.
+        shafts: All tools, rows of fulcrum and tip (n, 6), m.
+        later: The same afterwards.
+        organs: The organs.
+        enough: More is of no interest, rad.
+    """
+    p = row_of(tips[:, 3:], own)
+    margin = min(enough, cone_margin(view, p))
+    for i in range(len(shafts)):
+        if margin < 0.0:
+            return margin
+        g = row_of(shafts, i)
+        if i == own:
+            b = c = _spared(g, p)
+        else:
+            b = _spared(g, row_of(shafts[:, 3:], i))
+            c = _spared(g, row_of(later[:, 3:], i))
+        near = shaft_margin(view, p, g, b)
+        if norm(sub(c, b)) > _STILL:
+            near = min(near, shaft_margin(view, p, g, c), shaft_margin(view, p, b, c))
+            if segment_triangle_distance(view.apex, p, g, b, c) <= 0.0:
+                near = -abs(near)
+        margin = min(margin, near)
+    if margin < 0.0:
+        return margin
+    return min(margin, organ_margin(view, p, organs, enough))
+
+
+@compiled
+def _spared(g: Vector, p: Vector) -> Vector:
+    """Where the part of a shaft ends that counts; its fulcrum if nothing does."""
+    d = sub(p, g)
+    return along(g, 1.0 - SPARED / max(norm(d), SPARED), d)
 
 
 @compiled

@@ -6,6 +6,7 @@ from diagrams.common.scenario import nearest
 from tests.benchmarks import (
     bypass_full_loop,
     bypass_suite,
+    camera_suite,
     gauze_speed,
     hands,
     joint_offsets,
@@ -34,6 +35,7 @@ BENCHMARKS = {
     "hands": hands,
     "joint-offsets": joint_offsets,
     "organs": organ_suite,
+    "camera": camera_suite,
     "snake": snake_speed,
     "snake-friction": snake_friction,
     "resection": resection_speed,

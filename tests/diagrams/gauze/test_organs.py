@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagrams.common.run import simulate
 from diagrams.common.scenario import ScenarioError
 from diagrams.gauze.plots import plots
 from diagrams.studies import load_scenario
@@ -19,17 +20,31 @@ def test_the_lobe_is_passed_and_nothing_touched():
     assert figures["time_ratio"] < 1.3
 
 
+THROUGH = (
+    "behaviour=field",
+    "clearance_constraint.active=false",
+    "time_ratio=false",
+    "duration=3.0",
+)
+
+
 def test_without_constraint_and_bypass_it_would_go_through():
-    through = run(
-        "gauze_organs",
-        "behaviour=field",
-        "clearance_constraint.active=false",
-        "time_ratio=false",
-        "duration=3.0",
-    )
+    through = run("gauze_organs", *THROUGH, "organ_touch.acts=true")
     assert through.metrics["min_organ_clearance"] < -0.005
     assert through.metrics["max_tissue_force"] > 1.0
     assert np.isfinite(through.organs.touch.f).all()
+
+
+def test_where_tissue_is_not_to_push_back_the_first_touch_ends_the_run():
+    stopped = simulate(load_scenario("gauze_organs", list(THROUGH)))
+    assert "organ_touch.acts" in stopped.error
+    assert stopped.simulated < 1.0
+    assert stopped.organs.touch.depth.max() == 0.0
+
+
+def test_a_press_feels_the_tissue():
+    with pytest.raises(ScenarioError, match="acts"):
+        load_scenario("gauze_press", ["organ_touch.acts=false"])
 
 
 def test_it_is_passed_on_a_patient_who_breathes():
