@@ -1,5 +1,6 @@
 """Organs in a gauze delivery: their systems, wires, signals and figures."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,11 @@ def known_organs(scenario: Any) -> OrganSet | None:
     return organ_set(scenario.organs) if scenario.organs else None
 
 
+def pushes_back(scenario: Any) -> bool:
+    """Whether tissue does; where nothing keeps the robot clear of it, it has to."""
+    return scenario.organ_touch.acts or not scenario.clearance_constraint.active
+
+
 def add_organs(
     builder: Any, scenario: Any, theatre: Any, organs: OrganSet
 ) -> dict[str, Any]:
@@ -43,7 +49,8 @@ def add_organs(
     shaft = theatre.instrument.shaft_geometry
     body = int(theatre.instrument.shaft.index())
     robot = capsule_of(scene_graph.model_inspector(), shaft, body)
-    touch = OrganTouch(organs, scenario.organs, robot, scenario.organ_touch)
+    how = replace(scenario.organ_touch, acts=pushes_back(scenario))
+    touch = OrganTouch(organs, scenario.organs, robot, how)
     posed = PosedOrgans(scene_graph, scenario.organs)
     motions = add_organ_motions(
         builder, scenario.organs, scenario.wall_motion, scenario.duration
@@ -100,7 +107,7 @@ def add_press(builder: Any, scenario: Any, organs: OrganSet) -> dict[str, Any]:
 
 def wired(scenario: Any, wires: list[tuple[str, str]]) -> list[tuple[str, str]]:
     """A diagram's wires with those of the organs, which take the place of some."""
-    wires = wires + (WIRES if scenario.organ_touch.acts else WIRES[:-1])
+    wires = wires + (WIRES if pushes_back(scenario) else WIRES[:-1])
     if scenario.press.active:
         taken = {sink for _, sink in PRESS_WIRES}
         wires = [wire for wire in wires if wire[1] not in taken] + PRESS_WIRES

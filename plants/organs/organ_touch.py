@@ -54,7 +54,7 @@ class OrganTouchParams:
     # A wire to the plant's applied forces costs a quarter of a run's time, even where
     # they are nothing.
     acts: bool = parameter(
-        True, "whether tissue pushes back; else the first touch ends the run"
+        True, "whether tissue pushes back; else, if kept clear of, a touch ends the run"
     )
 
 
