@@ -5,11 +5,10 @@ it, held by the grip through the lever outside; where it goes through the wall a
 of its own gives way sideways. All of it is native: joints with servos, and Drake's
 point contact. The hand's wish is told at instants.
 
-To touch, the shaft is a row of spheres. Drake 1.58 finds the normal of two capsules
-that cross from where their centres are, and turns it along one of them where they cross
-near an end; of a sphere and a capsule it is exact. Many springs side by side are also
-what two rods are that cross: what they have in contact grows with the force, which goes
-with depth to the power of 3/2, as Hertz has it.
+To touch, the shaft is a row of spheres. Drake 1.58 turns the normal of two capsules
+that cross near an end of one; of a sphere and a capsule it is exact. Many springs side
+by side are also what two rods are that cross: what they have in contact grows with the
+force, which goes with depth to the power of 3/2, as Hertz has it.
 
 A relaxed arm's hand has 100 to 500 N/m in the plane (Mussa-Ivaldi, Hogan and Bizzi
 1985), one that grips firmly several times that; its damping is assumed.
