@@ -170,6 +170,7 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
     trapped = False
     commitment = params.commitment if state.mode in (BYPASS, YIELD) else 0.0
     memory = (params.hysteresis, state.track, state.side, commitment, state.heading)
+    away: Step | None = None
     for rung, (margin, speed) in enumerate(rungs):
         clearance = params.body_radius + margin
         if margin == params.margins[-1]:
@@ -193,7 +194,13 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
             mode = BYPASS if full else YIELD
             track = edge.track if edge is not None else -1.0
             new = SwitchingState(mode, track, choice.side, state.best, heading=heading)
-            return speed * cos(heading), speed * sin(heading), new
+            found = speed * cos(heading), speed * sin(heading), new
+            # What leads away from the goal is left for when nothing leads nearer.
+            if choice.turn <= 0.5 * pi:
+                return found
+            away = away or found
+    if away is not None:
+        return away
     if trapped:
         met = _meet_group(params, state, sight)
         if met is not None:
