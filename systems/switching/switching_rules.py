@@ -121,8 +121,7 @@ def plan(
     vx, vy, state = _step(params, state, sight)
     if standing:
         vx, vy = _slow_down(params, sight, vx, vy)
-    if corners:
-        vx, vy = _slow_for_unseen(params, sight, corners, vx, vy)
+    vx, vy = _cautious(params, sight, corners, vx, vy)
     retreat = False
     if moving:
         clearance = params.body_radius + params.margins[0]
@@ -343,44 +342,99 @@ def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> P
     return limit * ex, limit * ey
 
 
-def _slow_for_unseen(
+def _cautious(
     params: SwitchingParams,
     sight: Sight,
     corners: Sequence[Corner],
     vx: float,
     vy: float,
 ) -> Point:
-    """Limits the speed so that the body stands before who steps out can reach it.
+    """Limits the speed for who may step out or turn, unless who walks is met by it."""
+    speed = hypot(vx, vy)
+    if speed < 1e-9:
+        return vx, vy
+    ex, ey = vx / speed, vy / speed
+    limit = speed
+    if params.unseen_speed > 0.0:
+        for corner in corners:
+            limit = _before_corner(params, sight, corner, ex, ey, limit)
+    for disc in sight.moving:
+        limit = _before_turning(params, sight, disc, ex, ey, limit)
+    if limit >= speed:
+        return vx, vy
+    ux, uy = limit * ex, limit * ey
+    clearance = params.body_radius + params.margins[-1]
+    meets = time_to_enter(ux, uy, sight.moving, clearance)
+    if meets < min(params.horizon, time_to_enter(vx, vy, sight.moving, clearance)):
+        return vx, vy
+    return ux, uy
+
+
+def _before_corner(
+    params: SwitchingParams,
+    sight: Sight,
+    corner: Corner,
+    ex: float,
+    ey: float,
+    limit: float,
+) -> float:
+    """The speed at which the body stands before who steps out can reach it.
 
     Who walks at `unseen_speed` w from the edge the moment it is passed is seen, and
     after the time `reaction` T the body brakes with `braking` a: while it does, for
     T + v/a, its way may come no nearer to the edge than w (T + v/a). A body that
     stands is not in the way of anybody who looks where they go.
     """
-    speed = hypot(vx, vy)
-    if speed < 1e-9 or params.unseen_speed == 0.0:
-        return vx, vy
-    ex, ey = vx / speed, vy / speed
     a, w, t_r = params.braking, params.unseen_speed, params.reaction
-    limit = speed
-    for corner in corners:
-        qx, qy = corner.x - sight.px, corner.y - sight.py
-        along, across = qx * ex + qy * ey, qx * ey - qy * ex
-        if along <= 0.0:
-            continue
-        low, high = 0.0, limit
-        for _ in range(6):  # the free distance falls with the speed: by halves
-            v = high if high == limit and low == 0.0 else 0.5 * (low + high)
-            stop = v * t_r + 0.5 * v * v / a
-            gap = hypot(max(along - stop, 0.0), across) - params.body_radius
-            if gap >= w * (t_r + v / a):
-                low = v
-                if v == limit:
-                    break
-            else:
-                high = v
-        limit = low
-    limit = max(limit, params.creep * params.speed)
-    if limit >= speed:
-        return vx, vy
-    return limit * ex, limit * ey
+    qx, qy = corner.x - sight.px, corner.y - sight.py
+    along, across = qx * ex + qy * ey, qx * ey - qy * ex
+    if along <= 0.0:
+        return limit
+    low, high = 0.0, limit
+    for _ in range(6):  # the free distance falls with the speed: by halves
+        v = high if high == limit and low == 0.0 else 0.5 * (low + high)
+        stop = v * t_r + 0.5 * v * v / a
+        gap = hypot(max(along - stop, 0.0), across) - params.body_radius
+        if gap >= w * (t_r + v / a):
+            low = v
+            if v == limit:
+                break
+        else:
+            high = v
+    return min(max(low, params.creep * params.speed), limit)
+
+
+def _before_turning(
+    params: SwitchingParams,
+    sight: Sight,
+    disc: Disc,
+    ex: float,
+    ey: float,
+    limit: float,
+) -> float:
+    """The speed at which the body can still back away from who turns towards it.
+
+    Who walks at something that stands turns before it, and nobody knows where to. If
+    he does so towards the body, then after the time `reaction` T it backs away with
+    `braking` a: the two have come nearer by s T + s^2 / (2 a), s being the speed at
+    which they were nearing.
+    """
+    qx, qy, wx, wy = disc.q_x, disc.q_y, disc.w_x, disc.w_y
+    d = hypot(qx, qy)
+    share = -(qx * ex + qy * ey) / d  # of the body's speed, towards him
+    if share <= 0.0:
+        return limit
+    a, w, t_r = params.braking, hypot(wx, wy), params.reaction
+    gap = max(d - disc.radius - params.body_radius, 0.0)
+    s = a * (sqrt(t_r * t_r + 2.0 * gap / a) - t_r)
+    most = max(s - w, 0.0) / share
+    if most >= limit:
+        return limit
+    for o in sight.standing:
+        ax, ay = o.q_x - qx, o.q_y - qy  # his place less the other's
+        b = ax * wx + ay * wy
+        rho = o.radius + disc.radius
+        c = ax * ax + ay * ay - rho * rho
+        if b < 0.0 and b * b > w * w * c:
+            return most
+    return limit
