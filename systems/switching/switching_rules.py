@@ -415,7 +415,7 @@ def _before_turning(
     """The speed at which the body can still back away from who turns towards it.
 
     Who walks at something that stands turns before it, and nobody knows where to. If
-    he does so towards the body, then after the time `reaction` T it backs away with
+    he does so towards the body, then after `notice` and `reaction` T it backs away with
     `braking` a: the two have come nearer by s T + s^2 / (2 a), s being the speed at
     which they were nearing.
     """
@@ -424,7 +424,7 @@ def _before_turning(
     share = -(qx * ex + qy * ey) / d  # of the body's speed, towards him
     if share <= 0.0:
         return limit
-    a, w, t_r = params.braking, hypot(wx, wy), params.reaction
+    a, w, t_r = params.braking, hypot(wx, wy), params.notice + params.reaction
     gap = max(d - disc.radius - params.body_radius, 0.0)
     s = a * (sqrt(t_r * t_r + 2.0 * gap / a) - t_r)
     most = max(s - w, 0.0) / share

@@ -116,8 +116,15 @@ class SwitchingParams(BodyParams):
         1.0, "deceleration when somebody does", "m/s^2", above=0.0, most=10.0
     )
     reaction: float = parameter(
-        0.4,
-        "until it brakes: scans that tell who walks and where to, a step, the wheels' lag",
+        0.2,
+        "until it brakes: a scan, a step, the wheels' lag",
+        "s",
+        least=0.0,
+        most=2.0,
+    )
+    notice: float = parameter(
+        0.2,
+        "until a track tells that somebody turned: two scans",
         "s",
         least=0.0,
         most=2.0,
