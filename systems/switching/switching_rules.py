@@ -186,6 +186,7 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
             mode = ATTRACTIVE if full else YIELD
             new = SwitchingState(mode, best=state.best)
             return (*_to_goal(params, sight, speed), new)
+        walled = bool(arcs)
         arcs += blocked_arcs(speed, moving, clearance, params.horizon)
         choice = nearest_free(arcs, wanted, speed, params.behind_bias, *memory)
         if choice is not None:
@@ -194,8 +195,9 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
             track = edge.track if edge is not None else -1.0
             new = SwitchingState(mode, track, choice.side, state.best, heading=heading)
             found = speed * cos(heading), speed * sin(heading), new
-            # What leads away from the goal is left for when nothing leads nearer.
-            if choice.turn <= 0.5 * pi:
+            # Between things that stand who comes goes where one flees to: what leads
+            # away from the goal is left for when nothing leads nearer.
+            if choice.turn <= 0.5 * pi or not walled:
                 return found
             away = away or found
     if away is not None:
