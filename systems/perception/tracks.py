@@ -152,6 +152,16 @@ def corrected(
         if t.number == 0.0:
             continue
         if mates[i] < 0:
+            # Two bodies are not in one place: it is another's, told twice.
+            twice = False
+            for j in range(len(rows)):
+                o = read_track(tracks[j])
+                near = hypot(o.x - t.x, o.y - t.y) < 0.5 * max(o.radius, t.radius)
+                if j != i and mates[j] >= 0 and o.number > 0.0 and near:
+                    twice = True
+            if twice:
+                rows[i, :] = 0.0
+                continue
             k = int(round((atan2(t.y - place.y, t.x - place.x) - place.theta) / STEP))
             d = hypot(t.x - place.x, t.y - place.y)
             r = scan[k % RAYS, 0]

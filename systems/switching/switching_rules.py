@@ -50,6 +50,7 @@ class Sight:
     discs: list[Disc]
     standing: list[Disc]
     moving: list[Disc]
+    edges: list[Disc]  # where what stands ends, to the point
 
 
 Step = tuple[float, float, SwitchingState]
@@ -117,6 +118,7 @@ def plan(
         standing + moving,
         standing,
         moving,
+        [Disc(-2.0, px - c.x, py - c.y, 0.0, 0.0, 0.0) for c in corners],
     )
     vx, vy, state = _step(params, state, sight)
     if standing:
@@ -161,7 +163,7 @@ def _to_goal(params: SwitchingParams, sight: Sight, speed: float) -> Point:
 
 def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
     """The free field nearest to the goal's, with the widest margin that leaves one."""
-    standing, moving = sight.standing, sight.moving
+    standing, moving = sight.standing + sight.edges, sight.moving
     wanted = atan2(sight.gy, sight.gx)
     rungs = [(margin, params.speed) for margin in params.margins]
     rungs += [(params.margins[-1], f * params.speed) for f in params.slower]
@@ -192,7 +194,7 @@ def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Ste
         if choice is not None:
             heading, edge = choice.heading, choice.disc
             mode = BYPASS if full else YIELD
-            track = edge.track if edge is not None else -1.0
+            track = max(edge.track, -1.0) if edge is not None else -1.0
             new = SwitchingState(mode, track, choice.side, state.best, heading=heading)
             found = speed * cos(heading), speed * sin(heading), new
             # Between things that stand who comes goes where one flees to: what leads
@@ -244,7 +246,12 @@ def _follow_group(params: SwitchingParams, state: SwitchingState, sight: Sight) 
     # What stands near the group's boundary is passed with half the margin.
     narrow = params.body_radius + 0.5 * params.margins[-1]
     member = next((o for o in standing if o.track == state.track), None)
-    if member is None:  # out of sight
+    if member is None:  # out of sight, or a point at an end that is not seen each time
+        spare = params.body_radius + 2.0 * clearance  # nothing passes between
+        member = min(standing, key=_gap, default=None)
+        if member is not None and _gap(member) > spare:
+            member = None
+    if member is None:
         return _step(params, SwitchingState(best=state.best), sight)
     free = free_range(gx, gy, standing, wide, params.vision)
     if (
@@ -268,16 +275,21 @@ def _follow_group(params: SwitchingParams, state: SwitchingState, sight: Sight) 
     ahead = min(max(straight / speed, 0.3), 1.0)
     if (
         time_to_enter(vx, vy, moving, clearance) >= params.horizon
-        and time_to_enter(vx, vy, standing, narrow) >= ahead
+        and time_to_enter(vx, vy, standing + sight.edges, narrow) >= ahead
     ):
         return vx, vy, state
     arcs = blocked_arcs(speed, moving, clearance, params.horizon)
-    arcs += blocked_arcs(speed, standing, narrow, ahead)
+    arcs += blocked_arcs(speed, standing + sight.edges, narrow, ahead)
     wanted = atan2(ey, ex)
     choice = nearest_free(arcs, wanted, speed, params.behind_bias, 0.0, -1.0, 1.0)
     if choice is None:
         return _least_bad(params, state, sight, wanted)
     return speed * cos(choice.heading), speed * sin(choice.heading), state
+
+
+def _gap(disc: Disc) -> float:
+    """From the body's middle to a disc's surface [m]."""
+    return hypot(disc.q_x, disc.q_y) - disc.radius
 
 
 def _leaves_straight(
@@ -337,7 +349,7 @@ def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> P
         return vx, vy
     ex, ey = vx / speed, vy / speed
     narrow = params.body_radius + 0.5 * params.margins[-1]
-    free = time_to_enter(ex, ey, sight.standing, narrow)
+    free = time_to_enter(ex, ey, sight.standing + sight.edges, narrow)
     limit = max(sqrt(2.0 * params.deceleration * free), 0.1 * params.speed)
     if limit >= speed:
         return vx, vy
