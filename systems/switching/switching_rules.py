@@ -363,7 +363,7 @@ def _cautious(
     vx: float,
     vy: float,
 ) -> Point:
-    """Limits the speed for who may step out or turn, unless who walks is met by it."""
+    """Slower for who may step out, unless somebody seen is met by it; and may turn."""
     speed = hypot(vx, vy)
     if speed < 1e-9:
         return vx, vy
@@ -372,16 +372,14 @@ def _cautious(
     if params.unseen_speed > 0.0:
         for corner in corners:
             limit = _before_corner(params, sight, corner, ex, ey, limit)
+    if limit < speed:
+        clearance = params.body_radius + params.margins[-1]
+        meets = time_to_enter(limit * ex, limit * ey, sight.moving, clearance)
+        if meets < min(params.horizon, time_to_enter(vx, vy, sight.moving, clearance)):
+            limit = speed
     for disc in sight.moving:
         limit = _before_turning(params, sight, disc, ex, ey, limit)
-    if limit >= speed:
-        return vx, vy
-    ux, uy = limit * ex, limit * ey
-    clearance = params.body_radius + params.margins[-1]
-    meets = time_to_enter(ux, uy, sight.moving, clearance)
-    if meets < min(params.horizon, time_to_enter(vx, vy, sight.moving, clearance)):
-        return vx, vy
-    return ux, uy
+    return limit * ex, limit * ey
 
 
 def _before_corner(
