@@ -12,10 +12,10 @@ leaves open (senses, moving obstacles, groups, leaving) is worked out here.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import atan2, cos, hypot, isfinite, pi, sin, sqrt
 
 from systems.switching.arcs import Disc, blocked_arcs, nearest_free, time_to_enter
+from systems.switching.caution import cautious
 from systems.switching.groups import (
     first_on_ray,
     free_range,
@@ -31,26 +31,12 @@ from systems.switching.switching_state import (
     UNREACHABLE,
     YIELD,
     Plan,
+    Sight,
     SwitchingParams,
     SwitchingState,
 )
 
 Point = tuple[float, float]
-
-
-@dataclass(slots=True)
-class Sight:
-    """The world as a step sees it: place, way to the goal, obstacles [m, m/s]."""
-
-    px: float
-    py: float
-    gx: float  # unit vector to the goal
-    gy: float
-    distance: float  # to the goal
-    discs: list[Disc]
-    standing: list[Disc]
-    moving: list[Disc]
-    edges: list[Disc]  # where what stands ends, to the point
 
 
 Step = tuple[float, float, SwitchingState]
@@ -123,7 +109,7 @@ def plan(
     vx, vy, state = _step(params, state, sight)
     if standing:
         vx, vy = _slow_down(params, sight, vx, vy)
-    vx, vy = _cautious(params, sight, corners, vx, vy)
+    vx, vy = cautious(params, sight, corners, vx, vy)
     retreat = False
     if moving:
         clearance = params.body_radius + params.margins[0]
@@ -354,99 +340,3 @@ def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> P
     if limit >= speed:
         return vx, vy
     return limit * ex, limit * ey
-
-
-def _cautious(
-    params: SwitchingParams,
-    sight: Sight,
-    corners: Sequence[Corner],
-    vx: float,
-    vy: float,
-) -> Point:
-    """Slower for who may step out, unless somebody seen is met by it; and may turn."""
-    speed = hypot(vx, vy)
-    if speed < 1e-9:
-        return vx, vy
-    ex, ey = vx / speed, vy / speed
-    limit = speed
-    if params.unseen_speed > 0.0:
-        for corner in corners:
-            limit = _before_corner(params, sight, corner, ex, ey, limit)
-    if limit < speed:
-        clearance = params.body_radius + params.margins[-1]
-        meets = time_to_enter(limit * ex, limit * ey, sight.moving, clearance)
-        if meets < min(params.horizon, time_to_enter(vx, vy, sight.moving, clearance)):
-            limit = speed
-    for disc in sight.moving:
-        limit = _before_turning(params, sight, disc, ex, ey, limit)
-    return limit * ex, limit * ey
-
-
-def _before_corner(
-    params: SwitchingParams,
-    sight: Sight,
-    corner: Corner,
-    ex: float,
-    ey: float,
-    limit: float,
-) -> float:
-    """The speed at which the body stands before who steps out can reach it.
-
-    Who walks at `unseen_speed` w from the edge the moment it is passed is seen, and
-    after the time `reaction` T the body brakes with `braking` a: while it does, for
-    T + v/a, its way may come no nearer to the edge than w (T + v/a). A body that
-    stands is not in the way of anybody who looks where they go.
-    """
-    a, w, t_r = params.braking, params.unseen_speed, params.reaction
-    qx, qy = corner.x - sight.px, corner.y - sight.py
-    along, across = qx * ex + qy * ey, qx * ey - qy * ex
-    if along <= 0.0:
-        return limit
-    low, high = 0.0, limit
-    for _ in range(6):  # the free distance falls with the speed: by halves
-        v = high if high == limit and low == 0.0 else 0.5 * (low + high)
-        stop = v * t_r + 0.5 * v * v / a
-        gap = hypot(max(along - stop, 0.0), across) - params.body_radius
-        if gap >= w * (t_r + v / a):
-            low = v
-            if v == limit:
-                break
-        else:
-            high = v
-    return min(max(low, params.creep * params.speed), limit)
-
-
-def _before_turning(
-    params: SwitchingParams,
-    sight: Sight,
-    disc: Disc,
-    ex: float,
-    ey: float,
-    limit: float,
-) -> float:
-    """The speed at which the body can still back away from who turns towards it.
-
-    Who walks at something that stands turns before it, and nobody knows where to. If
-    he does so towards the body, then after `notice` and `reaction` T it backs away with
-    `braking` a: the two have come nearer by s T + s^2 / (2 a), s being the speed at
-    which they were nearing.
-    """
-    qx, qy, wx, wy = disc.q_x, disc.q_y, disc.w_x, disc.w_y
-    d = hypot(qx, qy)
-    share = -(qx * ex + qy * ey) / d  # of the body's speed, towards him
-    if share <= 0.0:
-        return limit
-    a, w, t_r = params.braking, hypot(wx, wy), params.notice + params.reaction
-    gap = max(d - disc.radius - params.body_radius, 0.0)
-    s = a * (sqrt(t_r * t_r + 2.0 * gap / a) - t_r)
-    most = max(s - w, 0.0) / share
-    if most >= limit:
-        return limit
-    for o in sight.standing:
-        ax, ay = o.q_x - qx, o.q_y - qy  # his place less the other's
-        b = ax * wx + ay * wy
-        rho = o.radius + disc.radius
-        c = ax * ax + ay * ay - rho * rho
-        if b < 0.0 and b * b > w * w * c:
-            return most
-    return limit

@@ -5,6 +5,7 @@ from math import inf, pi
 from typing import NamedTuple
 
 from systems.common.parameter import Rules, parameter
+from systems.switching.arcs import Disc
 from systems.switching.body import BodyParams
 
 ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
@@ -144,6 +145,21 @@ class SwitchingParams(BodyParams):
         least = self.body_radius + self.margins[0]
         told = f"> {least:.6g}, body_radius and the first margin together"
         yield self.vision > least, "vision", told
+
+
+@dataclass(slots=True)
+class Sight:
+    """The world as a step sees it: place, way to the goal, obstacles [m, m/s]."""
+
+    px: float
+    py: float
+    gx: float  # unit vector to the goal
+    gy: float
+    distance: float  # to the goal
+    discs: list[Disc]
+    standing: list[Disc]
+    moving: list[Disc]
+    edges: list[Disc]  # where what stands ends, to the point
 
 
 class SwitchingState(NamedTuple):

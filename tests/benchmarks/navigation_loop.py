@@ -65,6 +65,7 @@ class Result:
     walls: list[float]  # s, wall time of each planner step
     path: list[tuple[float, float]]
     astray: float = 0.0  # m, greatest distance of the believed place from the true one
+    met: float = 0.0  # m/s, speed of what it collided with; 0 for what stands
 
 
 def closest(qx: float, qy: float, ux: float, uy: float, dt: float) -> float:
@@ -136,7 +137,7 @@ def run(
     walls: list[float] = []
     path = [(x, y)]
     straight = hypot(scene.goal[0] - x, scene.goal[1] - y)
-    outcome, astray = "timeout", 0.0
+    outcome, astray, met = "timeout", 0.0, 0.0
     k = 0
     frame: Frame = scene.frames(0)
     sensed = Sensed(scene, senses, seed) if senses else None
@@ -169,10 +170,13 @@ def run(
         for (a, b, r, _, _), (c, d, _, _, _) in zip(frame, after, strict=True):
             qx, qy = a - x, b - y
             ux, uy = (c - a) / dt - vx, (d - b) / dt - vy
-            clearance = min(clearance, closest(qx, qy, ux, uy, dt) - r - robot.radius)
+            gap = closest(qx, qy, ux, uy, dt) - r - robot.radius
+            if gap < clearance:
+                clearance, met = gap, hypot(c - a, d - b) / dt
         if scene.walls:
-            gap = wall_distance(scene.walls, np.array([nx, ny])).item()
-            clearance = min(clearance, gap - robot.radius)
+            gap = wall_distance(scene.walls, np.array([nx, ny])).item() - robot.radius
+            if gap < clearance:
+                clearance, met = gap, 0.0
         length += hypot(nx - x, ny - y)
         x, y = nx, ny
         frame = after
@@ -192,4 +196,5 @@ def run(
         walls,
         path,
         astray,
+        met,
     )

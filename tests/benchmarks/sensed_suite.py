@@ -174,8 +174,12 @@ def chosen() -> dict[str, Planner]:
     return {k: v for k, v in others if not any(word in k for word in blind)} | mine
 
 
-def row(name: str, results: Sequence[Result]) -> str:
-    """Rates, medians, and how far the place was off."""
+def row(name: str, results: Sequence[Result], speed: float) -> str:
+    """Rates, medians, and how far the place was off.
+
+    In brackets the collisions with what was slower than the robot's greatest speed,
+    whichever of the two moved.
+    """
     n = len(results)
     rates = [
         f"{sum(r.outcome == outcome for r in results) / n:>9.3f}"
@@ -183,6 +187,8 @@ def row(name: str, results: Sequence[Result]) -> str:
     ]
     astray = max(r.astray for r in results)
     clearance = statistics.median(r.clearance for r in results)
+    slower = sum(r.outcome == "collided" and r.met < speed for r in results) / n
+    rates.insert(2, f" ({slower:.3f})")
     return f"  {name:<26}{''.join(rates)}{clearance:>9.2f} m{astray:>7.2f} m"
 
 
@@ -213,12 +219,14 @@ def tables(
         if name in FASTER:
             kept = [scene for scene in worlds if avoidable(scene)]
         title = f"{name}: {len(kept)} of {len(worlds)} worlds"
-        lines = [f"\n{title}; reached, collided, timeout, clearance, place off"]
+        lines = [
+            f"\n{title}; reached, collided (slower), timeout, clearance, place off"
+        ]
         senses = Senses(*LEGS) if name in LEGGED else Senses()
         for planner, make in chosen().items():
             if not only or planner in only:
                 results = [run(s, make, senses, i) for i, s in enumerate(kept)]
-                lines.append(row(planner, results))
+                lines.append(row(planner, results, kept[0].robot.speed))
         yield "\n".join(lines)
 
 

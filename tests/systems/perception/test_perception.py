@@ -110,6 +110,18 @@ def test_who_walks_is_tracked_and_kept_in_mind_while_hidden(legs):
     assert not world.moving()
 
 
+def test_nobody_is_tracked_twice():
+    world = World(ROOM)
+    for k in range(12):
+        if k == 8:  # the same body again, as when it was seen as two for a moment
+            rows = world.tracks.reshape(-1, tracks.TRACK_SIZE)
+            rows[1] = rows[0]
+            rows[1, :3] += (90.0, 0.05, 0.05)
+        world.look(rows=[(2.0 - 0.04 * k, 0.5, 0.25, -0.4, 0.0)])
+        assert len(world.moving()) <= (1 if k != 7 else 2)
+    assert len(world.all()) == 1
+
+
 def test_walls_are_nobody_and_what_stood_there_before_is_forgotten():
     world = World(ROOM)
     for k in range(12):

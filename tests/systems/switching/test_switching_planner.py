@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 import pytest
 
-from systems.switching.signals import Seen
+from systems.switching.signals import Corner, Seen
 from systems.switching.switching_planner import SwitchingPlanner
 from systems.switching.switching_rules import plan
 from systems.switching.switching_state import (
@@ -102,6 +102,60 @@ def test_a_goal_walled_in_is_given_up():
     assert modes[-1] == UNREACHABLE
     assert hypot(place[0] - 8.0, place[1]) > 1.2
     assert least > 0.05
+
+
+def wall(y, x=0.0, half=3.0):
+    """Points of a wall along x."""
+    places = np.arange(x - half, x + half, 0.1)
+    return [Seen(1000.0 + k, a, y, 0.02, 0.0, 0.0) for k, a in enumerate(places)]
+
+
+def test_who_comes_along_a_corridor_is_passed_by_a_smaller_margin_not_fled_from():
+    walls = [
+        o._replace(track=o.track + 500.0 * (y > 0.0))
+        for y in (-0.9, 0.9)
+        for o in wall(y)
+    ]
+    walker = Seen(1.0, 1.6, 0.2, 0.25, -0.4, 0.0)
+    vx, vy, *_ = step([*walls, walker], place=(0.0, -0.3))
+    assert vx > 0.4 and vy <= 0.0
+
+
+def test_who_walks_at_a_wall_is_given_room_to_turn():
+    walker = Seen(1.0, 0.75, 0.0, 0.25, 0.0, 0.4)
+    free = step([walker], goal=(8.0, -1.0))
+    near = step([walker, *wall(1.5, 0.75)], goal=(8.0, -1.0))
+    assert hypot(*free[:2]) == pytest.approx(0.5)
+    # He turns to the robot: after T = 0.4 s they near each other at s, less by 1 m/s^2.
+    s = 0.4 + near.v_x
+    assert 0.0 < hypot(*near[:2]) < 0.45
+    assert s * 0.4 + 0.5 * s * s <= 0.75 - 0.25 - 0.18 + 1e-9
+
+
+def test_nobody_unseen_is_waited_for_where_somebody_seen_comes():
+    goal, corner = (8.0, 0.0), Corner(1.0, 0.5, 0.3)
+    follower = Seen(1.0, -0.9, 0.0, 0.25, 0.45, 0.0)
+    rest = (PARAMS, SwitchingState(), (0.0, 0.0), (0.0, 0.0), goal)
+    slow, fast = plan(*rest, [], [corner]), plan(*rest, [follower], [corner])
+    assert hypot(*slow[:2]) < 0.2 and hypot(*fast[:2]) == pytest.approx(0.5)
+
+
+def test_a_wall_ends_where_its_edge_was_seen():
+    # The last point is 0.12 m short of the end, as a cell's mean is.
+    points, edge = wall(0.2, -2.62, 2.5), Corner(1.0, 0.0, 0.2)
+    now = (PARAMS, SwitchingState(), (-0.3, 0.55), (0.0, 0.0), (0.6, -0.3))
+    ends = []
+    for corners in ([], [edge]):
+        heading = plan(*now, points, corners)
+        ends.append(heading.v_y / heading.v_x)
+    assert ends[1] > ends[0]
+
+
+def test_a_group_is_followed_on_if_the_point_followed_is_lost():
+    state = SwitchingState(GROUP, 1010.0, 1.0, 5.0)
+    points = [o for o in wall(0.33) if o.track != 1010.0]
+    assert step(points, state=state, goal=(0.0, 4.0)).state.mode == GROUP
+    assert step([], state=state, goal=(0.0, 4.0)).state.mode == ATTRACTIVE
 
 
 def test_a_faster_obstacle_is_told():
