@@ -140,21 +140,11 @@ def test_nobody_unseen_is_waited_for_where_somebody_seen_comes():
     assert hypot(*slow[:2]) < 0.2 and hypot(*fast[:2]) == pytest.approx(0.5)
 
 
-def test_a_wall_ends_where_its_edge_was_seen():
-    # The last point is 0.12 m short of the end, as a cell's mean is.
-    points, edge = wall(0.2, -2.62, 2.5), Corner(1.0, 0.0, 0.2)
-    now = (PARAMS, SwitchingState(), (-0.3, 0.55), (0.0, 0.0), (0.6, -0.3))
-    ends = []
-    for corners in ([], [edge]):
-        heading = plan(*now, points, corners)
-        ends.append(heading.v_y / heading.v_x)
-    assert ends[1] > ends[0]
-
-
 def test_a_group_is_followed_on_if_the_point_followed_is_lost():
-    state = SwitchingState(GROUP, 1010.0, 1.0, 5.0)
+    state = SwitchingState(GROUP, 1010.0, 1.0, 5.0, laps=1.0)
     points = [o for o in wall(0.33) if o.track != 1010.0]
-    assert step(points, state=state, goal=(0.0, 4.0)).state.mode == GROUP
+    on = step(points, state=state, goal=(0.0, 4.0)).state
+    assert on.mode == GROUP and on.laps == 1.0
     assert step([], state=state, goal=(0.0, 4.0)).state.mode == ATTRACTIVE
 
 
