@@ -93,8 +93,6 @@ def _before_turning(
     if share <= 0.0:
         return limit
     a, w, t_r = params.braking, hypot(wx, wy), params.notice + params.reaction
-    if w >= params.speed:
-        return limit  # from who is as fast it cannot back away
     gap = max(d - disc.radius - params.body_radius, 0.0)
     s = a * (sqrt(t_r * t_r + 2.0 * gap / a) - t_r)
     most = max(s - w, 0.0) / share
