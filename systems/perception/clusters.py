@@ -41,6 +41,7 @@ class Cluster(NamedTuple):
     right: float  # bearings of its ends in the world, rad
     left: float
     cut: float  # 1 if another begins where it ends
+    legs: float  # 1 if it is a person's, seen by one or both
 
 
 read_cluster, write_cluster = reader(Cluster), row_writer(Cluster)
@@ -88,7 +89,7 @@ def circle_of(
     hidden = 1.0 * (0.0 < before < near) + 2.0 * (0.0 < after < near)
     right = place.theta + (first - 0.25) * STEP
     left = place.theta + (last + 0.25) * STEP
-    return Cluster(x, y, radius, hidden, known, near, right, left, cut)
+    return Cluster(x, y, radius, hidden, known, near, right, left, cut, 0.0)
 
 
 @compiled
@@ -177,12 +178,12 @@ def people(params: Any, found: np.ndarray) -> np.ndarray:
             o = read_cluster(found[mate])
             x, y, known = 0.5 * (x + o.x), 0.5 * (y + o.y), min(known, o.known)
             hidden = 1.0 * SEEN
-            nobody = Cluster(o.x, o.y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            nobody = Cluster(o.x, o.y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             write_cluster(found, mate, nobody)
         elif leg[i]:
             hidden = 1.0 * LEG
         radius = max(c.radius, params.person)
-        ends = (c.near, c.right, c.left, c.cut)
+        ends = (c.near, c.right, c.left, c.cut, 1.0 * leg[i])
         person = Cluster(x, y, radius, hidden, known, *ends)
         write_cluster(rows, count, person)
         count += 1

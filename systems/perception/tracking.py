@@ -109,20 +109,23 @@ class TrackingParams:
 def told(
     params: Any, tracks: np.ndarray, dt: float, place: RobotState, within: float
 ) -> np.ndarray:
-    """What moves, a time after the scan, within a distance: rows of `Seen`."""
+    """People and what moves, a time after the scan, within a distance: rows of `Seen`."""
     rows = np.zeros((len(tracks), SEEN_SIZE))
     rows[:, 0] = NOBODY
     for i in range(len(tracks)):
         t = read_track(tracks[i])
-        x, y = t.x + dt * t.v_x, t.y + dt * t.v_y
-        if t.moves > 0.0 and hypot(x - place.x, y - place.y) <= within:
-            write_seen(rows, i, Seen(t.number, x, y, t.radius, t.v_x, t.v_y))
+        v_x, v_y = t.moves * t.v_x, t.moves * t.v_y
+        x, y = t.x + dt * v_x, t.y + dt * v_y
+        person = t.legs > 0.5 and t.hits >= 2.0  # who stands is wider than his legs
+        near = hypot(x - place.x, y - place.y) <= within
+        if near and t.number > 0.0 and (t.moves > 0.0 or person):
+            write_seen(rows, i, Seen(t.number, x, y, t.radius, v_x, v_y))
     return rows
 
 
 @compiled
 def walking(params: np.ndarray, tracks: np.ndarray, dt: float) -> np.ndarray:
-    """All that moves, as the port `moving` has it."""
+    """People and all that moves, as the port `moving` has it."""
     nowhere = RobotState(0.0, 0.0, 0.0, 0.0, 0.0)
     table = tracks.reshape((CAPACITY, TRACK_SIZE))
     return told(params[0], table, dt, nowhere, inf).ravel()

@@ -41,6 +41,8 @@ class Track(NamedTuple):
     # Where it stood last.
     stood_x: float
     stood_y: float
+    # How often it was legs that were seen of it, lately: a share.
+    legs: float
 
 
 read_track, write_track = reader(Track), row_writer(Track)
@@ -71,6 +73,7 @@ def predicted(params: Any, tracks: np.ndarray, dt: float) -> np.ndarray:
                 t.moves,
                 t.stood_x,
                 t.stood_y,
+                t.legs,
             )
             write_track(rows, i, later)
     return rows
@@ -80,7 +83,7 @@ def predicted(params: Any, tracks: np.ndarray, dt: float) -> np.ndarray:
 def aged(t: Track, missed: float) -> Track:
     """A track that was not seen."""
     place = (t.number, t.x, t.y, t.v_x, t.v_y, t.pp, t.pv, t.vv, t.radius, t.hits)
-    return Track(*place, missed, t.moves, t.stood_x, t.stood_y)
+    return Track(*place, missed, t.moves, t.stood_x, t.stood_y, t.legs)
 
 
 @compiled
@@ -207,12 +210,13 @@ def corrected(
                 1.0 if moves else 0.0,
                 t.stood_x if moves or t.moves == 0.0 else x,
                 t.stood_y if moves or t.moves == 0.0 else y,
+                t.legs + 0.2 * (c.legs - t.legs),
             ),
         )
     free = 0
     for j in range(len(found)):
         c = read_cluster(found[j])
-        if taken[j] or c.known > 0.0:
+        if taken[j] or (c.known > 0.0 and c.legs == 0.0):
             continue
         inside = False  # a part of what is known already
         for i in range(len(rows)):
@@ -227,7 +231,7 @@ def corrected(
         sigma = params.noise if c.hidden == WHOLE else params.hidden_noise
         hits = 0.25 if c.cut > 0.0 and c.hidden != WHOLE else 1.0
         sure = (sigma**2, 0.0, 1.0, c.radius, hits, 0.0, 0.0)
-        new = Track(last, c.x, c.y, 0.0, 0.0, *sure, c.x, c.y)
+        new = Track(last, c.x, c.y, 0.0, 0.0, *sure, c.x, c.y, c.legs)
         write_track(rows, free, new)
     return rows, last
 
