@@ -20,7 +20,7 @@ from systems.common.compiled import compiled, packed
 from systems.common.parameter import Rules, check, parameter
 from systems.common.signal import reader, row_writer, size
 from systems.perception.clusters import clusters
-from systems.perception.grid import standing, stands
+from systems.perception.grid import standing, stands, walks
 from systems.perception.grid_mapping import SCAN_PERIOD, GridMappingParams
 from systems.perception.grid_mapping import constants as grid_constants
 from systems.perception.signals import GRID, MOVING
@@ -145,7 +145,11 @@ def sight(
     table = tracks.reshape((CAPACITY, TRACK_SIZE))
     vision = params[0].vision
     moving = told(params[0], table, dt, robot, vision)
-    return np.concatenate((moving, standing(params[0], rows, robot, vision))).ravel()
+    points = standing(params[0], rows, robot, vision)
+    for n in range(len(points)):  # where somebody is nothing stands
+        if points[n, 0] >= 0.0 and walks(moving, points[n, 1], points[n, 2], 0.0):
+            points[n, 0] = NOBODY
+    return np.concatenate((moving, points)).ravel()
 
 
 @compiled

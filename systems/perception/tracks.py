@@ -170,7 +170,9 @@ def corrected(
             r = scan[k % RAYS, 0]
             through = r == 0.0 or r > d + t.radius + 0.1
             missed = t.missed + (3.0 if through else 1.0)
-            if missed * params.period > params.memory or t.hits < 2.0:
+            # What was seen for a moment is believed in for a moment.
+            memory = min(params.memory, t.hits * params.period)
+            if missed * params.period > memory or t.hits < 2.0:
                 rows[i, :] = 0.0
             else:
                 write_track(rows, i, aged(t, missed))
