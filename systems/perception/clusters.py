@@ -155,26 +155,43 @@ def clusters(
 
 
 @compiled
+def pairs(params: Any, found: np.ndarray, leg: np.ndarray) -> np.ndarray:
+    """Of each leg the other one, -1 for none: those nearest to each other first."""
+    n = len(found)
+    gaps = np.full((n, n), params.apart)
+    for i in range(n):
+        for j in range(i + 1, n):
+            if leg[i] and leg[j]:
+                c, o = read_cluster(found[i]), read_cluster(found[j])
+                gaps[i, j] = hypot(c.x - o.x, c.y - o.y)
+    mates = np.full(n, -1)
+    while n > 0:
+        k = int(gaps.argmin())
+        i, j = k // n, k % n
+        if gaps[i, j] >= params.apart:
+            break
+        mates[i], mates[j] = j, i
+        gaps[i, :] = gaps[j, :] = gaps[:, i] = gaps[:, j] = params.apart
+    return mates
+
+
+@compiled
 def people(params: Any, found: np.ndarray) -> np.ndarray:
     """Clusters with legs made people: two near each other are one."""
     n = len(found)
     leg = np.zeros(n, np.bool_)
     for i in range(n):
         leg[i] = read_cluster(found[i]).radius <= params.leg
+    mates = pairs(params, found, leg)
     rows = np.empty_like(found)
     count = 0
     for i in range(n):
         c = read_cluster(found[i])
         if c.radius == 0.0:
             continue  # a second leg
-        mate, least = -1, params.apart
-        for j in range(i + 1, n):
-            o = read_cluster(found[j])
-            gap = hypot(c.x - o.x, c.y - o.y)
-            if leg[i] and leg[j] and o.radius > 0.0 and gap < least:
-                mate, least = j, gap
+        mate = int(mates[i])
         x, y, hidden, known = c.x, c.y, c.hidden, c.known
-        if mate >= 0:
+        if mate > i:
             o = read_cluster(found[mate])
             x, y, known = 0.5 * (x + o.x), 0.5 * (y + o.y), min(known, o.known)
             hidden = 1.0 * SEEN
@@ -211,7 +228,11 @@ def seen_as(
     """
     if c.hidden == SEEN:
         return c.x, c.y, params.noise
-    if c.hidden == LEG or c.radius >= radius:
+    if c.hidden == LEG:  # he is beside it, where he was thought to be if that may be
+        d = hypot(x - c.x, y - c.y)
+        share = min(params.beside / d, 1.0) if d > 0.0 else 0.0
+        return c.x + share * (x - c.x), c.y + share * (y - c.y), params.hidden_noise
+    if c.radius >= radius:
         return c.x, c.y, params.hidden_noise
     d = c.near + radius
     phi = asin(radius / d)

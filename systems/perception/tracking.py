@@ -66,6 +66,9 @@ class TrackingParams:
     apart: float = parameter(
         0.6, "greatest distance of a person's legs", "m", above=0.0, most=2.0
     )
+    beside: float = parameter(
+        0.2, "greatest distance of a leg from the middle", "m", above=0.0, most=1.0
+    )
     noise: float = parameter(
         0.02, "standard deviation of a circle's place", "m", above=0.0, most=0.5
     )
