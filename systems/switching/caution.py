@@ -19,7 +19,7 @@ def cautious(
     vx: float,
     vy: float,
 ) -> tuple[float, float]:
-    """Slower for who may step out, unless somebody seen is met by it; and may turn."""
+    """Slower for who may step out or turn, unless somebody seen is met by it."""
     speed = hypot(vx, vy)
     if speed < 1e-9:
         return vx, vy
@@ -28,13 +28,13 @@ def cautious(
     if params.unseen_speed > 0.0:
         for corner in corners:
             limit = _before_corner(params, sight, corner, ex, ey, limit)
+    for disc in sight.moving:
+        limit = _before_turning(params, sight, disc, ex, ey, limit)
     if limit < speed:
         clearance = params.body_radius + params.margins[-1]
         meets = time_to_enter(limit * ex, limit * ey, sight.moving, clearance)
         if meets < min(params.horizon, time_to_enter(vx, vy, sight.moving, clearance)):
             limit = speed
-    for disc in sight.moving:
-        limit = _before_turning(params, sight, disc, ex, ey, limit)
     return (limit * ex, limit * ey) if limit < speed else (vx, vy)
 
 
