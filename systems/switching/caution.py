@@ -28,12 +28,15 @@ def cautious(
     if params.unseen_speed > 0.0:
         for corner in corners:
             limit = _before_corner(params, sight, corner, ex, ey, limit)
+    others = sight.moving
     for disc in sight.moving:
-        limit = _before_turning(params, sight, disc, ex, ey, limit)
+        slower = _before_turning(params, sight, disc, ex, ey, limit)
+        if slower < limit:
+            limit, others = slower, [o for o in sight.moving if o is not disc]
     if limit < speed:
         clearance = params.body_radius + params.margins[-1]
-        meets = time_to_enter(limit * ex, limit * ey, sight.moving, clearance)
-        if meets < min(params.horizon, time_to_enter(vx, vy, sight.moving, clearance)):
+        meets = time_to_enter(limit * ex, limit * ey, others, clearance)
+        if meets < min(params.horizon, time_to_enter(vx, vy, others, clearance)):
             limit = speed
     return (limit * ex, limit * ey) if limit < speed else (vx, vy)
 
