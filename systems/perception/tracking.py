@@ -117,7 +117,8 @@ def told(
     rows[:, 0] = NOBODY
     for i in range(len(tracks)):
         t = read_track(tracks[i])
-        v_x, v_y = t.moves * t.v_x, t.moves * t.v_y
+        w = 1.0 if t.moves > 0.0 or t.hits < 4.0 else 0.0
+        v_x, v_y = w * t.v_x, w * t.v_y
         x, y = t.x + dt * v_x, t.y + dt * v_y
         person = t.legs > 0.5 and t.hits >= 2.0  # who stands is wider than his legs
         near = hypot(x - place.x, y - place.y) <= within
