@@ -54,7 +54,8 @@ def _before_corner(
     Who walks at `unseen_speed` w from the edge the moment it is passed is seen, and
     after the time `reaction` T the body brakes with `braking` a: while it does, for
     T + v/a, its way may come no nearer to the edge than w (T + v/a). A body that
-    stands is not in the way of anybody who looks where they go.
+    stands is not in the way of anybody who looks where they go: no corner is passed
+    slower than it can stop within the least of its margins.
     """
     a, w, t_r = params.braking, params.unseen_speed, params.reaction
     qx, qy = corner.x - sight.px, corner.y - sight.py
@@ -72,7 +73,8 @@ def _before_corner(
                 break
         else:
             high = v
-    return min(max(low, params.creep * params.speed), limit)
+    least = a * (sqrt(t_r * t_r + 2.0 * params.margins[-1] / a) - t_r)
+    return min(max(low, least), limit)
 
 
 def _before_turning(

@@ -130,9 +130,6 @@ class SwitchingParams(BodyParams):
         least=0.0,
         most=2.0,
     )
-    creep: float = parameter(
-        0.2, "share of the speed at which every corner is passed", above=0.0, most=1.0
-    )
     approach_gain: float = parameter(
         2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
     )

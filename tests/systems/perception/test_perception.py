@@ -11,7 +11,8 @@ from plants.turtlebot.lidar import constants as lidar_constants
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.signal import size, view
 from systems.perception import grid_mapping, tracking, tracks
-from systems.perception.clusters import BETWEEN, Cluster, seen_as
+from systems.perception.clusters import BETWEEN, LEG, Cluster, people, seen_as
+from systems.perception.clusters import SEEN as WHOLE
 from systems.perception.grid import OCCUPIED
 from systems.perception.grid_mapping import GridMappingParams
 from systems.perception.place import Belief
@@ -110,6 +111,60 @@ def test_who_walks_is_tracked_and_kept_in_mind_while_hidden(legs):
     assert not world.moving()
 
 
+def told(world: World) -> np.ndarray:
+    """What the planner is told from the middle, rows of `Seen`."""
+    rows = tracking.sight(
+        world.k_track, world.tracks, 0.0, np.array(CENTRE), world.grid
+    ).reshape(-1, 6)
+    return rows[rows[:, 0] >= 0.0]
+
+
+def test_who_stands_is_as_wide_as_a_person_and_no_part_of_the_map():
+    world = World(ROOM, legs=True)
+    for _ in range(30):
+        world.look(rows=[(1.5, 0.5, 0.3, 0.0, 0.0)])
+    people = [row for row in told(world) if row[0] < 1000.0]
+    assert len(people) == 1
+    assert people[0][1:] == pytest.approx([1.5, 0.5, 0.3, 0.0, 0.0], abs=0.03)
+    points = told(world)[:, 1:3] - (1.5, 0.5)
+    assert (np.hypot(*points.T) < 0.3).sum() == 1  # himself
+    assert world.occupied(-3.0, 0.0)  # the wall is there as ever
+    # He walks on and is the same; behind a screen he is soon forgotten.
+    number = people[0][0]
+    for k in range(8):
+        world.look(rows=[(1.5, 0.5 - 0.04 * k, 0.3, 0.0, -0.4)])
+    (walker,) = [row for row in told(world) if row[0] < 1000.0]
+    assert walker[0] == number and walker[5] == pytest.approx(-0.4, abs=0.2)
+
+
+def test_who_is_new_is_told_with_the_speed_that_two_scans_show():
+    world = World(ROOM, legs=True)
+    for k in range(3):
+        world.look(rows=[(2.0, 0.1 * k, 0.3, 0.0, 1.0)])
+    (walker,) = [row for row in told(world) if row[0] < 1000.0]
+    assert walker[5] > 0.5
+
+
+def test_legs_that_are_nearest_to_each_other_are_one_persons():
+    # Three legs in a row: the middle one belongs to the nearer of its neighbours.
+    legs = [Cluster(2.0, y, 0.06, WHOLE, 0.0, 1.9, 0.0, 0.0, 0.0, 0.0)
+            for y in (0.0, 0.4, 0.62)]  # fmt: skip
+    params = tracking.constants(TrackingParams(person=0.3), MAPPING)[0]
+    found = people(params, np.array(legs))
+    (one, two) = sorted((Cluster(*row) for row in found), key=lambda c: c.y)
+    assert one.y == 0.0 and one.hidden == LEG
+    assert two.y == pytest.approx(0.51) and two.hidden == WHOLE
+    assert one.legs == two.legs == 1.0
+
+
+def test_one_leg_moves_nobody_who_may_stand_beside_it():
+    params = TrackingParams(person=0.3)
+    leg = Cluster(2.0, 0.0, 0.3, LEG, 0.0, 1.9, 0.0, 0.0, 0.0, 1.0)
+    assert seen_as.py_func(params, CENTRE, leg, 2.0, 0.15, 0.3)[:2] == (2.0, 0.15)
+    x, y, _ = seen_as.py_func(params, CENTRE, leg, 2.0, 0.5, 0.3)
+    assert (x, y) == pytest.approx((2.0, params.beside))
+
+
 def test_nobody_is_tracked_twice():
     world = World(ROOM)
     for k in range(12):
@@ -177,7 +232,7 @@ def test_the_cheapest_matches_in_all_are_taken():
 def test_who_is_hidden_on_both_sides_covers_what_is_seen_of_them():
     params = TrackingParams()
     near, ends = 2.0, (-0.05, 0.05)
-    slit = Cluster(2.1, 0.0, 0.1, BETWEEN, 0.0, near, *ends, 0.0)
+    slit = Cluster(2.1, 0.0, 0.1, BETWEEN, 0.0, near, *ends, 0.0, 0.0)
     phi = asin(0.3 / 2.3)
     for bearing, told in ((0.02, 0.02), (1.5, -0.05 + phi), (-1.5, 0.05 - phi)):
         x, y = 2.3 * cos(bearing), 2.3 * sin(bearing)
