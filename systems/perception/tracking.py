@@ -112,7 +112,7 @@ class TrackingParams:
 def told(
     params: Any, tracks: np.ndarray, dt: float, place: RobotState, within: float
 ) -> np.ndarray:
-    """People and what moves, a time after the scan, within a distance: rows of `Seen`."""
+    """People and what moves, a time after the scan, within a distance: as `Seen`."""
     rows = np.zeros((len(tracks), SEEN_SIZE))
     rows[:, 0] = NOBODY
     for i in range(len(tracks)):

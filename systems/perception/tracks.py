@@ -218,7 +218,10 @@ def corrected(
     free = 0
     for j in range(len(found)):
         c = read_cluster(found[j])
-        if taken[j] or (c.known > 0.0 and c.legs == 0.0):
+        # What stands is not tracked, but a whole thing that has been there for a
+        # moment only may be one that moves slowly, whose track was lost.
+        settled = c.known > 0.0 and (c.hidden != WHOLE or c.cut > 0.0)
+        if taken[j] or (c.legs == 0.0 and (c.known > 1.0 or settled)):
             continue
         inside = False  # a part of what is known already
         for i in range(len(rows)):
