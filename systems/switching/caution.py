@@ -93,7 +93,7 @@ def _before_turning(
     which they were nearing.
     """
     qx, qy, wx, wy = disc.q_x, disc.q_y, disc.w_x, disc.w_y
-    d = hypot(qx, qy)
+    d = max(hypot(qx, qy), 1e-9)
     share = -(qx * ex + qy * ey) / d  # of the body's speed, towards him
     if share <= 0.0:
         return limit
