@@ -179,7 +179,7 @@ if __name__ == '__main__':
             break
     assert kills
     if most == 1:
-        assert kept and not (tmp_path / "report.html").exists()
+        assert kept and 0 < len(Store(tmp_path / "runs", {}).done()) < 240
     run_campaign(SLOW, tmp_path, workers=1)
     assert content(tmp_path) == content(undisturbed)
 
