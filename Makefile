@@ -2,6 +2,7 @@
 #                only files whose digests are in hashes.txt
 # make demo      runs gauze_dynamic: figures, plots and a replay in out/
 # make test      style, types and all tests, JOBS at a time
+# make studies   what takes too long for it; ONLY=DIR_OR_FILE for some of them
 # make golden    the figures of all scenarios against the table of golden ones
 # make bench     benchmarks, side by side (SEED=N for other scenes, ONLY=NAME for one)
 # make docs      the site, in out/site: pages, notebooks run, docstrings, a gallery
@@ -16,7 +17,7 @@ export OMP_NUM_THREADS ?= 1
 GALLERY := gauze_dynamic gauze_breathing gauze_press pwe_arc_breathing nav_three_moving \
 	nav_crowd snake_circle resect_auto_small keyhole_approach
 
-.PHONY: setup demo test golden bench docs notebook clean
+.PHONY: setup demo test studies golden bench docs notebook clean
 
 setup: .venv/ready
 
@@ -44,6 +45,9 @@ test: setup
 	$(BIN)/mypy & types=$$!; \
 	$(BIN)/python -m pytest -m "not study" -n $(JOBS) --no-loadscope-reorder \
 		&& wait $$types
+
+studies: setup
+	$(BIN)/python -m pytest -m study -n $(JOBS) --no-loadscope-reorder $(ONLY)
 
 golden: setup
 	$(BIN)/python -m tests.golden $(ONLY)

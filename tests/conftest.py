@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from functools import cache
+import gc
 import json
 import os
 from pathlib import Path
@@ -81,6 +82,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the long groups first."""
     place = {name: number for number, name in enumerate(FIRST)}
     items.sort(key=lambda item: place.get(group(item.nodeid), len(FIRST)))
+
+
+def pytest_collection_finish() -> None:
+    """Lets the collector run more rarely: it took a tenth of the time to compile.
+
+    numba makes and drops millions of small objects, beside all that was imported.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 100)
 
 
 @pytest.fixture(scope="session")

@@ -33,6 +33,8 @@ _AHEAD = 2
 """Batches in flight for each worker."""
 _DEATHS = 20
 """Workers that a batch may outlive."""
+PATIENCE = "5s"
+"""With a scheduler that does not answer."""
 
 _QUIET = {
     "distributed.worker.profile.enabled": False,
@@ -112,7 +114,7 @@ def cluster(workers: int, scheduler: str = "") -> Iterator[Client]:
             yield client
         return
     try:
-        client = Client(scheduler, timeout="5s")
+        client = Client(scheduler, timeout=PATIENCE)
     except (OSError, ValueError) as error:
         raise ScenarioError(
             f"--scheduler {scheduler}: cannot be reached; expected tcp://HOST:PORT"

@@ -34,7 +34,7 @@ def act(job: dict[str, Any]) -> dict[str, Any]:
         case "keep":
             _KEPT.append(b"x" * 100_000_000)
         case "slow":
-            time.sleep(0.02)
+            time.sleep(0.01)
     digest = hashlib.sha256(repr(sorted(told.items())).encode()).digest()
     x = float(told.get("x", 0.0))
     return {

@@ -1,5 +1,6 @@
 """Campaigns on a real scheduler and real workers, killed and begun again."""
 
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 import os
 import random
@@ -12,6 +13,7 @@ import time
 import pandas
 import pytest
 
+from diagrams.campaigns import engine
 from diagrams.campaigns import run as running
 from diagrams.campaigns.campaign import Campaign, StopParams, load_campaign
 from diagrams.campaigns.engine import cluster
@@ -39,9 +41,33 @@ def content(out):
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory):
+def begun():
+    """As `cluster`, but one of a single worker is begun once for all who ask."""
+    with ExitStack() as stack:
+        found = []
+
+        @contextmanager
+        def one(workers, scheduler=""):
+            assert workers == 1 and not scheduler
+            if not found:
+                found.append(stack.enter_context(cluster(1)))
+            yield found[0]
+
+        yield one
+
+
+@pytest.fixture
+def one_cluster(begun, monkeypatch):
+    """For tests that are of something else than how clusters begin and end."""
+    monkeypatch.setattr(running, "cluster", begun)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory, begun):
     out = tmp_path_factory.mktemp("campaign")
-    run_campaign(SLOW, out, workers=1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(running, "cluster", begun)
+        run_campaign(SLOW, out, workers=1)
     return out
 
 
@@ -116,7 +142,10 @@ def test_workers_killed_at_random_make_no_difference(
 
 
 @pytest.mark.parametrize("most", [1, pytest.param(10, marks=pytest.mark.study)])
-def test_campaign_killed_and_resumed_is_the_same(undisturbed, tmp_path, most):
+def test_campaign_killed_and_resumed_is_the_same(
+    undisturbed, tmp_path, one_cluster, most
+):
+    """Once as soon as something was kept, or often and at any moment."""
     script = (
         "from tests.diagrams.campaigns.test_run import SLOW;"
         "from diagrams.campaigns import run; from pathlib import Path;"
@@ -138,7 +167,10 @@ if __name__ == '__main__':
             start_new_session=True,
         )
         try:
-            process.wait(dice.uniform(3.0, 6.0))
+            while most == 1 and not (kept := list(tmp_path.glob("runs/*.parquet"))):
+                assert process.poll() is None
+                time.sleep(0.02)
+            process.wait(dice.uniform(0.0, 0.5) if most == 1 else dice.uniform(3, 6))
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
@@ -146,11 +178,13 @@ if __name__ == '__main__':
         else:
             break
     assert kills
+    if most == 1:
+        assert kept and 0 < len(Store(tmp_path / "runs", {}).done()) < 240
     run_campaign(SLOW, tmp_path, workers=1)
     assert content(tmp_path) == content(undisturbed)
 
 
-def test_poisoned_runs_are_named_and_the_rest_is_done(tmp_path):
+def test_poisoned_runs_are_named_and_the_rest_is_done(tmp_path, one_cluster):
     poison = ["nothing"] * 9 + ["segfault", "loop", "memory", "error", "exit"]
     campaign = Campaign(
         act=ACT,
@@ -211,7 +245,7 @@ def test_unknown_figures_are_refused_before_anything_runs(tmp_path):
     assert not list(tmp_path.glob("runs/*.parquet"))
 
 
-def test_splitting_finds_what_chance_does_not_and_resumes(tmp_path):
+def test_splitting_finds_what_chance_does_not_and_resumes(tmp_path, one_cluster):
     rare = Campaign(
         act=ACT,
         search="splitting",
@@ -238,7 +272,7 @@ def test_report_says_how_sure_it_is(undisturbed):
     assert "http" not in page.replace("http-equiv", "")
 
 
-def test_crossing_from_the_command_line(tmp_path, capsys):
+def test_crossing_from_the_command_line(tmp_path, capsys, one_cluster):
     out = tmp_path / "crossing"
     words = ["campaign", "crossing", "--runs", "3", "--workers", "1"]
     assert main([*words, "--out", str(out)]) == 0
@@ -254,7 +288,8 @@ def test_crossing_from_the_command_line(tmp_path, capsys):
         (["campaign", "crossing", "--scheduler", "tcp://127.0.0.1:9"], "be reached"),
     ],
 )
-def test_bad_words_end_in_one_line(words, match, tmp_path, capsys):
+def test_bad_words_end_in_one_line(words, match, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(engine, "PATIENCE", "0.5s")
     assert main([*words, "--out", str(tmp_path / "x")]) == 2
     assert match in capsys.readouterr().err
 

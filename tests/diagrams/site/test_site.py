@@ -32,8 +32,27 @@ def test_names_of_files_lead_to_their_docstrings():
     )
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
+FEW = [Path("diagrams/live"), Path("plants/turtlebot"), Path("systems/motion")]
+"""A room of each floor: what the reference has of it, in the quick site."""
+ALL = [room for floor in build.FLOORS for room in build.rooms_of(floor)]
+NOTEBOOKS = sorted((build.ROOT / "notebooks").glob("*.ipynb"))
+
+
+@pytest.fixture(
+    scope="module", params=["part", pytest.param("whole", marks=pytest.mark.study)]
+)
+def site(request, tmp_path_factory):
+    """Its folder, the rooms in its reference, and its notebooks.
+
+    The quick one has every page, but docstrings of a few rooms and one notebook:
+    `make docs` builds the whole, as strictly.
+    """
+    is_whole = request.param == "whole"
+    rooms, notebooks = (ALL, NOTEBOOKS) if is_whole else (FEW, NOTEBOOKS[:1])
+    left_out = {n.relative_to(build.ROOT) for n in NOTEBOOKS} - {
+        n.relative_to(build.ROOT) for n in notebooks
+    }
+    pages = [page for page in build.pages() if page not in left_out]
     folder = tmp_path_factory.mktemp("site")
     run = folder / "runs" / "some_run"
     run.mkdir(parents=True)
@@ -48,18 +67,21 @@ def site(tmp_path_factory):
         # And what can be searched for is a fifth of what is left.
         search = "material.plugins.search.plugin.SearchPlugin.on_page_context"
         patch.setattr(search, lambda *told, **more: None)
-        return build.build_site(folder / "out", [run]).parent
+        patch.setattr(build, "pages", lambda: iter(pages))
+        front = build.build_site(folder / "out", [run], rooms=rooms)
+    return front.parent, rooms, notebooks
 
 
 def test_it_builds_without_a_warning(site):
     """Every room is there, and what a page shows is, too."""
+    site, rooms, notebooks = site
     front = (site / "index.html").read_text()
     assert '<iframe src="gallery/some_run/replay.html"' in front
-    for floor in build.FLOORS:
-        for room in build.rooms_of(floor):
-            assert (site / room / "index.html").exists()
-            assert (site / "reference" / ".".join(room.parts) / "index.html").exists()
-    for notebook in (build.ROOT / "notebooks").glob("*.ipynb"):
+    for room in ALL:
+        assert (site / room / "index.html").exists()
+    for room in rooms:
+        assert (site / "reference" / ".".join(room.parts) / "index.html").exists()
+    for notebook in notebooks:
         assert (site / "notebooks" / notebook.stem / "index.html").exists()
     gallery = (site / "gallery" / "index.html").read_text()
     assert "some_run/way_there.png" in gallery and "some_run/replay.html" in gallery
@@ -68,13 +90,14 @@ def test_it_builds_without_a_warning(site):
 
 def test_nothing_is_fetched_from_elsewhere(site):
     """But by notebooks, whose pages have their own scripts."""
+    site = site[0]
     for page in ("index.html", "systems/motion/index.html"):
         fetched = r'<(?:script|link|img)[^>]+(?:src|href)="https?:'
         assert not re.findall(fetched, (site / page).read_text())
 
 
 def test_the_reference_has_ports_and_units(site):
-    text = (site / "reference" / "systems.motion" / "index.html").read_text()
+    text = (site[0] / "reference" / "systems.motion" / "index.html").read_text()
     assert re.search(r"<li>\s*(<p>)?Port <code>tool</code> accepts", text)
     assert "greatest speed of the tip [m/s]" in text
 
