@@ -9,7 +9,7 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import BasicVector, LeafSystem, ValueProducer
 
 from systems.common.compiled import Numbers
-from systems.common.signal import example, flat, size
+from systems.common.signal import example_array, size
 from systems.common.stopwatch import STOPWATCH
 
 
@@ -85,7 +85,7 @@ class Block(LeafSystem):
             drawn: How its elements are drawn if it is noise.
         """
         self.signals[name] = signal
-        return self.vector_in(name, flat(example(signal)).tolist(), drawn)
+        return self.vector_in(name, example_array(signal).tolist(), drawn)
 
     def signal_out(
         self,

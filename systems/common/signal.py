@@ -127,6 +127,13 @@ def example(signal: Any) -> Any:
     return signal(*(field.example for field in fields(signal).values()))
 
 
+def example_array(signal: Any) -> np.ndarray:
+    """The same as a port has it; of many things one by one would take long."""
+    if isinstance(signal, Many):
+        return np.tile(example_array(signal.signal), len(signal.names))
+    return flat(example(signal))
+
+
 def flat(value: Any) -> np.ndarray:
     """A signal's value as a port has it: one element after the other."""
     if isinstance(value, tuple):
