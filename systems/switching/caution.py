@@ -4,45 +4,71 @@ Both limits follow from what a body needs to stand or to back away: its reaction
 deceleration, and how fast the other may come.
 """
 
-from collections.abc import Sequence
 from math import hypot, sqrt
+from typing import Any
 
-from systems.switching.arcs import Disc, time_to_enter
+import numpy as np
+
+from systems.common.compiled import compiled
+from systems.common.signal import reader
+from systems.switching.arcs import Disc, read_disc, time_to_enter
 from systems.switching.signals import Corner
-from systems.switching.switching_state import Sight, SwitchingParams
+from systems.switching.switching_state import Sight
+
+read_corner = reader(Corner)
 
 
+@compiled
 def cautious(
-    params: SwitchingParams,
-    sight: Sight,
-    corners: Sequence[Corner],
-    vx: float,
-    vy: float,
+    params: Any, sight: Sight, corners: np.ndarray, vx: float, vy: float
 ) -> tuple[float, float]:
-    """Slower for who may step out or turn, unless somebody seen is met by it."""
+    """Slower for who may step out or turn, unless somebody seen is met by it.
+
+    Args:
+        params: A record of `constants`.
+        sight: What is seen.
+        corners: Rows of `Corner`.
+        vx: The velocity that is wanted, x [m/s].
+        vy: The same, y [m/s].
+    """
     speed = hypot(vx, vy)
     if speed < 1e-9:
         return vx, vy
     ex, ey = vx / speed, vy / speed
     limit = speed
     if params.unseen_speed > 0.0:
-        for corner in corners:
-            limit = _before_corner(params, sight, corner, ex, ey, limit)
-    others = sight.moving
-    for disc in sight.moving:
-        slower = _before_turning(params, sight, disc, ex, ey, limit)
+        for i in range(len(corners)):
+            corner = read_corner(corners[i])
+            if corner.there > 0.0:
+                limit = _before_corner(params, sight, corner, ex, ey, limit)
+    moving, whose = sight.moving, -1
+    for i in range(len(moving)):
+        slower = _before_turning(params, sight, read_disc(moving[i]), ex, ey, limit)
         if slower < limit:
-            limit, others = slower, [o for o in sight.moving if o is not disc]
+            limit, whose = slower, i
     if limit < speed:
-        clearance = params.body_radius + params.margins[-1]
-        meets = time_to_enter(limit * ex, limit * ey, others, clearance)
-        if meets < min(params.horizon, time_to_enter(vx, vy, others, clearance)):
+        meets = _meets_others(params, moving, whose, limit * ex, limit * ey)
+        soon = min(params.horizon, _meets_others(params, moving, whose, vx, vy))
+        if meets < soon:
             limit = speed
     return (limit * ex, limit * ey) if limit < speed else (vx, vy)
 
 
+@compiled
+def _meets_others(
+    params: Any, moving: np.ndarray, whose: int, vx: float, vy: float
+) -> float:
+    """Time [s] until somebody who moves is met, but for the one of row `whose`."""
+    clearance = params.body_radius + params.least
+    if whose < 0:
+        return time_to_enter(vx, vy, moving, clearance)
+    before = time_to_enter(vx, vy, moving[:whose], clearance)
+    return min(before, time_to_enter(vx, vy, moving[whose + 1 :], clearance))
+
+
+@compiled
 def _before_corner(
-    params: SwitchingParams,
+    params: Any,
     sight: Sight,
     corner: Corner,
     ex: float,
@@ -73,12 +99,13 @@ def _before_corner(
                 break
         else:
             high = v
-    least = a * (sqrt(t_r * t_r + 2.0 * params.margins[-1] / a) - t_r)
+    least = a * (sqrt(t_r * t_r + 2.0 * params.least / a) - t_r)
     return min(max(low, least), limit)
 
 
+@compiled
 def _before_turning(
-    params: SwitchingParams,
+    params: Any,
     sight: Sight,
     disc: Disc,
     ex: float,
@@ -103,7 +130,8 @@ def _before_turning(
     most = max(s - w, 0.0) / share
     if most >= limit:
         return limit
-    for o in sight.standing:
+    for i in range(len(sight.standing)):
+        o = read_disc(sight.standing[i])
         ax, ay = o.q_x - qx, o.q_y - qy  # his place less the other's
         b = ax * wx + ay * wy
         rho = o.radius + disc.radius

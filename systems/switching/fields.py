@@ -10,6 +10,8 @@ basato su potenziali artificiali alternati", chapter 2, and of O. Khatib,
 
 from math import acos, atan2, cos, hypot, inf, sin, sqrt
 
+from systems.common.compiled import compiled
+
 Vector = tuple[float, float]
 
 
@@ -120,6 +122,7 @@ def involute_potential(qx: float, qy: float, rho: float, side: float) -> float:
     return sqrt(d * d - rho * rho) - rho * acos(rho / d) - side * rho * atan2(qy, qx)
 
 
+@compiled
 def involute_field(qx: float, qy: float, rho: float, side: float) -> Vector:
     """Anti-gradient of `involute_potential`, of unit size everywhere.
 
@@ -133,6 +136,7 @@ def involute_field(qx: float, qy: float, rho: float, side: float) -> Vector:
     return out * nx - along * ny, out * ny + along * nx
 
 
+@compiled
 def involute_components(d: float, rho: float) -> tuple[float, float]:
     """Tangential and outward parts of the involute field at distance d."""
     if d >= rho:

@@ -9,20 +9,23 @@ motion planning with global proofs", IEEE Trans. Robotics Autom. 13(6), 1997).
 That distance falls from group to group, so that the walk ends.
 """
 
-from collections.abc import Sequence
 from math import atan2, inf, pi, sqrt
 
-from systems.switching.arcs import TWO_PI, Disc, time_to_enter
+import numpy as np
+
+from systems.common.compiled import compiled
+from systems.switching.arcs import TWO_PI, Disc, read_disc, time_to_enter
 from systems.switching.fields import involute_field
 
-Follow = tuple[float, float, Disc, float]
+Follow = tuple[float, float, int, float]
 """Unit direction x, y of the way, the member it follows, its straight part [m]."""
 
 
+@compiled
 def way_round(
-    member: Disc,
+    member: int,
     side: float,
-    standing: Sequence[Disc],
+    standing: np.ndarray,
     clearance: float,
     look_ahead: float,
     spare: float,
@@ -30,9 +33,9 @@ def way_round(
     """The direction that keeps a group on one side of the body.
 
     Args:
-        member: Member of the group followed so far.
+        member: The row of the group's member followed so far.
         side: +1 keeps the group on the left, -1 on the right.
-        standing: All standing obstacles in sight.
+        standing: Rows of `Disc`, all standing obstacles in sight.
         clearance: What a safety circle has beyond the disc's radius [m].
         look_ahead: Least length of the way that must be free of members [m].
         spare: Gaps between safety circles up to this width are closed [m].
@@ -43,30 +46,32 @@ def way_round(
     """
     ex = ey = straight = 0.0
     for _ in range(len(standing) + 1):
-        rho = member.radius + clearance
-        qx, qy = member.q_x, member.q_y
+        followed = read_disc(standing[member])
+        rho = followed.radius + clearance
+        qx, qy = followed.q_x, followed.q_y
         ex, ey = involute_field(qx, qy, rho, side)
         straight = sqrt(max(qx * qx + qy * qy - rho * rho, 0.0))
         reach = max(straight, look_ahead)
-        following = None
-        most = 1e-6
-        for other in standing:
+        following, most = -1, 1e-6
+        for i in range(len(standing)):
+            other = read_disc(standing[i])
             touch = rho + other.radius + clearance + spare
             ax, ay = qx - other.q_x, qy - other.q_y
-            if ax * ax + ay * ay >= touch * touch or other is member:
+            if ax * ax + ay * ay >= touch * touch or i == member:
                 continue
-            if time_to_enter(ex, ey, (other,), clearance + spare) > reach:
+            if time_to_enter(ex, ey, standing[i : i + 1], clearance + spare) > reach:
                 continue
             # Hand over to the member that turns the way most from the group.
             away, _, _ = _turn(ex, ey, other, clearance + spare, side)
             if away > most:
-                most, following = away, other
-        if following is None:
+                most, following = away, i
+        if following < 0:
             break
         member = following
     return ex, ey, member, straight
 
 
+@compiled
 def _turn(
     ex: float,
     ey: float,
@@ -81,10 +86,11 @@ def _turn(
     return (away if away < 1.5 * pi else 0.0), fx, fy
 
 
+@compiled
 def free_range(
     gx: float,
     gy: float,
-    standing: Sequence[Disc],
+    standing: np.ndarray,
     clearance: float,
     vision: float,
 ) -> float:
@@ -93,35 +99,56 @@ def free_range(
     Args:
         gx: Direction, x.
         gy: Direction, y.
-        standing: Standing obstacles in sight.
+        standing: Rows of `Disc`, standing obstacles in sight.
         clearance: What a safety circle has beyond the disc's radius [m].
         vision: Radius of sight [m]; a disc whose centre is beyond is not seen.
     """
-    largest = max((o.radius for o in standing), default=0.0)
+    largest = 0.0
+    for i in range(len(standing)):
+        largest = max(largest, read_disc(standing[i]).radius)
     seen = max(vision - largest - clearance, 0.0)
     return min(time_to_enter(gx, gy, standing, clearance), seen)
 
 
+@compiled
 def first_on_ray(
     gx: float,
     gy: float,
-    standing: Sequence[Disc],
+    standing: np.ndarray,
     clearance: float,
-) -> Disc | None:
-    """The standing obstacle whose safety circle a ray enters first."""
-    first, found = inf, None
-    for disc in standing:
-        t = time_to_enter(gx, gy, (disc,), clearance)
+) -> int:
+    """The row of the obstacle whose safety circle a ray enters first; -1 for none."""
+    first, found = inf, -1
+    for i in range(len(standing)):
+        t = time_to_enter(gx, gy, standing[i : i + 1], clearance)
         if t < first:
-            first, found = t, disc
+            first, found = t, i
     return found
 
 
+@compiled
+def _turn_round(
+    gx: float,
+    gy: float,
+    member: int,
+    side: float,
+    standing: np.ndarray,
+    clearance: float,
+    look_ahead: float,
+    spare: float,
+) -> float:
+    """How far [rad] the way round a group turns from the goal on one side."""
+    ex, ey, _, _ = way_round(member, side, standing, clearance, look_ahead, spare)
+    angle = atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI
+    return angle if angle < 1.5 * pi else 0.0
+
+
+@compiled
 def shorter_side(
     gx: float,
     gy: float,
-    member: Disc,
-    standing: Sequence[Disc],
+    member: int,
+    standing: np.ndarray,
     clearance: float,
     look_ahead: float,
     spare: float,
@@ -132,10 +159,7 @@ def shorter_side(
     Arguments as of `way_round`; the goal lies in unit direction g, and `kept` is
     the advantage [rad] of the counter-clockwise side.
     """
-
-    def turn(side: float) -> float:
-        ex, ey, _, _ = way_round(member, side, standing, clearance, look_ahead, spare)
-        angle = atan2(-side * (gx * ey - gy * ex), gx * ex + gy * ey) % TWO_PI
-        return angle if angle < 1.5 * pi else 0.0
-
-    return 1.0 if turn(1.0) - turn(-1.0) <= kept else -1.0
+    rest = standing, clearance, look_ahead, spare
+    left = _turn_round(gx, gy, member, 1.0, *rest)
+    right = _turn_round(gx, gy, member, -1.0, *rest)
+    return 1.0 if left - right <= kept else -1.0

@@ -132,6 +132,7 @@ class NavigationPlanner(Block):
         """
 
 
+@compiled
 def velocity(robot: RobotState) -> tuple[float, float]:
     """Velocity of the body [m/s]."""
     return robot.v * cos(robot.theta), robot.v * sin(robot.theta)

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
+import numpy as np
+
 from plants.crowd.orca import orca_velocity
 from plants.crowd.signals import Obstacle
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.parameter import parameter
-from systems.switching.arcs import Disc, time_to_enter
+from systems.switching.arcs import DISC_SIZE, Disc, time_to_enter
 from systems.switching.body import BodyParams
 from systems.switching.navigation_planner import (
     PERIOD,
@@ -83,7 +85,8 @@ def retreats(
         for o in obstacles
         if o.v_x or o.v_y
     ]
-    return time_to_enter(0.0, 0.0, moving, clearance) < _SOON
+    discs = np.array(moving, float).reshape(-1, DISC_SIZE)
+    return time_to_enter(0.0, 0.0, discs, clearance) < _SOON
 
 
 class OrcaPlanner(NavigationPlanner):

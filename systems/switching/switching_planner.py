@@ -1,20 +1,60 @@
 """The switching planner as a block; its rules are in `switching_rules`."""
 
+from math import isfinite
 from typing import Any
 
+import numpy as np
+
 from plants.turtlebot.turtlebot import RobotState
-from systems.switching.navigation_planner import (
-    PERIOD,
-    NavigationPlanner,
-    Planned,
-    velocity,
+from systems.common.compiled import compiled
+from systems.common.signal import finiteness
+from systems.common.step_block import StepBlock
+from systems.switching.navigation_planner import NO_CORNERS, PERIOD, velocity
+from systems.switching.signals import (
+    CORNERS,
+    SEEN,
+    Goal,
+    Mode,
+    PlanarVelocity,
 )
-from systems.switching.signals import Corner, Goal, Mode, PlanarVelocity, Seen
-from systems.switching.switching_rules import plan
-from systems.switching.switching_state import SwitchingParams, SwitchingState
+from systems.switching.switching_rules import planned
+from systems.switching.switching_state import (
+    START,
+    SwitchingParams,
+    SwitchingState,
+    constants,
+)
+
+finite_robot, finite_goal = finiteness(RobotState), finiteness(Goal)
 
 
-class SwitchingPlanner(NavigationPlanner):
+@compiled
+def _update(
+    params: Any,
+    held: PlanarVelocity,
+    mode: Mode,
+    last_goal: Goal,
+    state: SwitchingState,
+    robot: RobotState,
+    seen: np.ndarray,
+    goal: Goal,
+    corners: np.ndarray,
+) -> tuple[PlanarVelocity, Mode, Goal, SwitchingState]:
+    """Velocity, mode, goal and state from now on."""
+    known = finite_robot(robot) and finite_goal(goal)
+    if not known or not isfinite(seen.sum() + corners.sum()):
+        return PlanarVelocity(0.0, 0.0), mode, last_goal, state
+    if goal.x != last_goal.x or goal.y != last_goal.y:
+        state = START
+    place, to = (robot.x, robot.y), (goal.x, goal.y)
+    step = planned(params, state, place, velocity(robot), to, seen, corners)
+    new = step.state
+    retreat, outrun = 1.0 if step.retreat else 0.0, 1.0 if step.outrun else 0.0
+    mode = Mode(new.mode, new.track, new.side, retreat, outrun)
+    return PlanarVelocity(step.v_x, step.v_y), mode, goal, new
+
+
+class SwitchingPlanner(StepBlock):
     """Follows one potential at a time: the goal's, or one obstacle's on one side.
 
     Sections 2.2 and 3.2 of the thesis, with the involute-helicoid potential in the
@@ -24,6 +64,8 @@ class SwitchingPlanner(NavigationPlanner):
     Port ``seen`` accepts rows of `Seen`.
     Port ``goal`` accepts the `Goal`; another one starts afresh.
     Port ``corners`` accepts rows of `Corner`; slower where somebody may step out.
+    Where an input is not finite, the robot is to stand.
+
     Port ``v_R`` emits the `PlanarVelocity` to take.
     Port ``mode`` emits the `Mode`; its states are `MODES`.
     """
@@ -36,24 +78,19 @@ class SwitchingPlanner(NavigationPlanner):
         Raises:
             ParameterError: If a parameter is out of range.
         """
-        super().__init__(
-            params or SwitchingParams(), period, Goal(0.0, 0.0), SwitchingState()
+        super().__init__()
+        self.period = period
+        self.declare_update(
+            _update,
+            [constants(params or SwitchingParams())],
+            {"robot": RobotState, "seen": SEEN, "goal": Goal, "corners": CORNERS},
+            {
+                "v_R": PlanarVelocity(0.0, 0.0),
+                "mode": Mode(),
+                "_goal": Goal(0.0, 0.0),
+                "_state": START,
+            },
+            period,
+            timed=False,
+            defaults={"corners": NO_CORNERS},
         )
-
-    def plan(
-        self,
-        robot: RobotState,
-        goal: Goal,
-        seen: list[Seen],
-        corners: list[Corner],
-        *memory: Any,
-    ) -> Planned:
-        """The velocity to take; remembers the goal and the rules' state."""
-        last_goal, state = memory
-        if goal != last_goal:
-            state = SwitchingState()
-        here = (robot.x, robot.y)
-        step = plan(self.params, state, here, velocity(robot), goal, seen, corners)
-        followed = (step.state.mode, step.state.track, step.state.side)
-        mode = Mode(*followed, float(step.retreat), float(step.outrun))
-        return Planned(PlanarVelocity(step.v_x, step.v_y), mode, (goal, step.state))

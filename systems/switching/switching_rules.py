@@ -12,10 +12,23 @@ leaves open (senses, moving obstacles, groups, leaving) is worked out here.
 """
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, isfinite, pi, sin, sqrt
+from math import atan2, cos, hypot, inf, isfinite, pi, sin, sqrt
+from typing import Any, NamedTuple
 
-from systems.switching.arcs import Disc, blocked_arcs, nearest_free, time_to_enter
-from systems.switching.caution import cautious
+import numpy as np
+
+from systems.common.compiled import compiled
+from systems.common.signal import reader
+from systems.switching.arcs import (
+    DISC_SIZE,
+    Disc,
+    blocked_arcs,
+    nearest_free,
+    read_disc,
+    time_to_enter,
+    write_disc,
+)
+from systems.switching.caution import cautious, read_corner
 from systems.switching.groups import (
     first_on_ray,
     free_range,
@@ -28,19 +41,29 @@ from systems.switching.switching_state import (
     BYPASS,
     GROUP,
     LEAVE,
+    START,
     UNREACHABLE,
     YIELD,
     Plan,
     Sight,
     SwitchingParams,
     SwitchingState,
+    constants,
 )
 
 Point = tuple[float, float]
+read_seen = reader(Seen)
+CHANGES = 8
+"""How often a step may go from one state to another; then it takes the least bad."""
 
 
-Step = tuple[float, float, SwitchingState]
-"""Velocity v_x, v_y [m/s] and state."""
+class Step(NamedTuple):
+    """What a rule says: whether it is the step's end, velocity [m/s] and state."""
+
+    ends: bool
+    v_x: float
+    v_y: float
+    state: SwitchingState
 
 
 def plan(
@@ -67,193 +90,269 @@ def plan(
         The velocity to take, and what to remember.
 
     Raises:
+        ParameterError: If a parameter is out of range.
         ValueError: If a number is not finite.
+    """
+    if not isfinite(sum(place) + sum(velocity) + sum(goal)):
+        raise ValueError(f"place={place}, velocity={velocity}, goal={goal}: not finite")
+    lost = [one for one in (*obstacles, *corners) if not isfinite(sum(one))]
+    if lost:
+        raise ValueError(f"obstacles {lost}: not finite")
+    record, state = constants(params)[0], SwitchingState(*map(float, state))
+    return planned(record, state, place, velocity, goal, *rows(obstacles, corners))
+
+
+def rows(
+    obstacles: Sequence[Seen], corners: Sequence[Corner]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Obstacles and corners as `planned` takes them."""
+    told = np.array(obstacles, float).reshape(-1, len(Seen._fields))
+    return told, np.array(corners, float).reshape(-1, len(Corner._fields))
+
+
+@compiled
+def planned(
+    params: Any,
+    state: SwitchingState,
+    place: Point,
+    velocity: Point,
+    goal: Point,
+    seen: np.ndarray,
+    corners: np.ndarray,
+) -> Plan:
+    """As `plan`, of numbers that are finite.
+
+    Args:
+        params: A record of `constants`.
+        state: State after the step before.
+        place: Where the body is [m].
+        velocity: How it moves [m/s].
+        goal: Where it shall go [m].
+        seen: Rows of `Seen`; those of a track below 0 hold nothing.
+        corners: Rows of `Corner`; not all need be there.
     """
     ahead = params.response
     (px, py), (vx, vy), (gx, gy) = place, velocity, goal
     px, py = px + ahead * vx, py + ahead * vy
     gx, gy = gx - px, gy - py
-    if not isfinite(gx + gy):
-        raise ValueError(f"place={place}, velocity={velocity}, goal={goal}: not finite")
     distance = hypot(gx, gy)
     if distance < 1e-9:
-        return Plan(0.0, 0.0, SwitchingState())
-    standing: list[Disc] = []
-    moving: list[Disc] = []
-    slow = params.standing_speed**2
-    fastest = total = 0.0
-    for track, x, y, radius, wx, wy in obstacles:
-        ww = wx * wx + wy * wy
-        total += x + y + radius + ww
-        if ww > slow:
-            qx, qy = px - (x + ahead * wx), py - (y + ahead * wy)
-            moving.append(Disc(track, qx, qy, radius, wx, wy))
-            if ww > fastest:
-                fastest = ww
-        else:
-            standing.append(Disc(track, px - x, py - y, radius, 0.0, 0.0))
-    if not isfinite(total):
-        lost = [obstacle for obstacle in obstacles if not isfinite(sum(obstacle))]
-        raise ValueError(f"obstacles {lost}: not finite")
+        return Plan(0.0, 0.0, START, False, False)
+    discs, stand, end, fastest = _discs(params, px, py, seen, corners)
     sight = Sight(
         px,
         py,
         gx / distance,
         gy / distance,
         distance,
-        standing + moving,
-        standing,
-        moving,
-        [Disc(-2.0, px - c.x, py - c.y, 0.0, 0.0, 0.0) for c in corners],
+        discs[:stand],
+        discs[:end],
+        discs[end:],
     )
     vx, vy, state = _step(params, state, sight)
-    if standing:
+    if stand:
         vx, vy = _slow_down(params, sight, vx, vy)
     vx, vy = cautious(params, sight, corners, vx, vy)
-    retreat = False
-    if moving:
-        clearance = params.body_radius + params.margins[0]
-        meets = time_to_enter(0.0, 0.0, moving, clearance)
-        retreat = meets < params.retreat_time
-    return Plan(vx, vy, state, fastest >= params.speed**2, retreat)
+    clearance = params.body_radius + params.margin
+    meets = time_to_enter(0.0, 0.0, sight.moving, clearance)
+    outrun = fastest >= params.speed * params.speed
+    return Plan(vx, vy, state, outrun, meets < params.retreat_time)
 
 
-def _step(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
-    """The state's own rule."""
-    if state.mode == GROUP or state.mode == UNREACHABLE:
-        return _follow_group(params, state, sight)
-    if state.mode == LEAVE and _leaves_straight(params, state, sight):
-        return (*_to_goal(params, sight, params.speed), state)
-    clearance = params.body_radius + params.margins[0]
-    if _is_clear(params, sight, params.speed, clearance):
-        if state.mode != ATTRACTIVE:
-            state = SwitchingState(best=state.best)
-        return (*_to_goal(params, sight, params.speed), state)
-    return _bypass(params, state, sight)
+@compiled
+def _discs(
+    params: Any, px: float, py: float, seen: np.ndarray, corners: np.ndarray
+) -> tuple[np.ndarray, int, int, float]:
+    """Rows of `Disc`: what stands, corners, what moves.
+
+    Returns:
+        The rows, the first of the corners and the first that moves, and the square of
+        the fastest speed.
+    """
+    discs = np.empty((len(seen) + len(corners), DISC_SIZE))
+    moving = np.empty((len(seen), DISC_SIZE))
+    slow, fastest = params.standing_speed * params.standing_speed, 0.0
+    count = movers = 0
+    for i in range(len(seen)):
+        o = read_seen(seen[i])
+        if o.track < 0.0:
+            continue
+        ww = o.v_x * o.v_x + o.v_y * o.v_y
+        if ww > slow:
+            ahead = params.response
+            qx, qy = px - (o.x + ahead * o.v_x), py - (o.y + ahead * o.v_y)
+            write_disc(moving, movers, Disc(o.track, qx, qy, o.radius, o.v_x, o.v_y))
+            movers += 1
+            fastest = max(fastest, ww)
+        else:
+            disc = Disc(o.track, px - o.x, py - o.y, o.radius, 0.0, 0.0)
+            write_disc(discs, count, disc)
+            count += 1
+    stand = count
+    for i in range(len(corners)):
+        corner = read_corner(corners[i])
+        if corner.there > 0.0:
+            disc = Disc(-2.0, px - corner.x, py - corner.y, 0.0, 0.0, 0.0)
+            write_disc(discs, count, disc)
+            count += 1
+    discs[count : count + movers] = moving[:movers]
+    return discs[: count + movers], stand, count, fastest
 
 
-def _is_clear(
-    params: SwitchingParams, sight: Sight, speed: float, clearance: float
-) -> bool:
+@compiled
+def _step(
+    params: Any, state: SwitchingState, sight: Sight
+) -> tuple[float, float, SwitchingState]:
+    """The state's own rule; velocity [m/s] and state."""
+    for _ in range(CHANGES):
+        if state.mode == GROUP or state.mode == UNREACHABLE:
+            step = _follow_group(params, state, sight)
+        elif state.mode == LEAVE and _leaves_straight(params, state, sight):
+            step = _to_goal(params, sight, params.speed, state)
+        elif _is_clear(params, sight, params.speed, params.body_radius + params.margin):
+            if state.mode != ATTRACTIVE:
+                state = _anew(ATTRACTIVE, state.best)
+            step = _to_goal(params, sight, params.speed, state)
+        else:
+            step = _bypass(params, state, sight)
+        if step.ends:
+            return step.v_x, step.v_y, step.state
+        state = step.state
+    step = _least_bad(params, state, sight, atan2(sight.gy, sight.gx))
+    return step.v_x, step.v_y, step.state
+
+
+@compiled
+def _anew(mode: int, best: float) -> SwitchingState:
+    """A state of a mode that remembers nothing but how near a straight way has led."""
+    return _changed(START, float(mode), START.track, START.side, best, START.heading)
+
+
+@compiled
+def _changed(
+    state: SwitchingState,
+    mode: float,
+    track: float,
+    side: float,
+    best: float,
+    heading: float,
+) -> SwitchingState:
+    """A state that remembers the same way about a group."""
+    hit, laps = (state.hit_x, state.hit_y, state.away), state.laps
+    return SwitchingState(mode, track, side, best, *hit, laps, heading)
+
+
+@compiled
+def _is_clear(params: Any, sight: Sight, speed: float, clearance: float) -> bool:
     """Whether the straight way to the goal enters no safety circle."""
     vx, vy = speed * sight.gx, speed * sight.gy
-    enters = time_to_enter(vx, vy, sight.discs, clearance)
+    enters = _enters(vx, vy, sight, clearance)
     return enters >= min(params.horizon, sight.distance / speed)
 
 
-def _to_goal(params: SwitchingParams, sight: Sight, speed: float) -> Point:
+@compiled
+def _enters(vx: float, vy: float, sight: Sight, clearance: float) -> float:
+    """Time until anything that stands or moves is met [s]."""
+    standing = time_to_enter(vx, vy, sight.standing, clearance)
+    return min(standing, time_to_enter(vx, vy, sight.moving, clearance))
+
+
+@compiled
+def _to_goal(params: Any, sight: Sight, speed: float, state: SwitchingState) -> Step:
     """The attractive field (equation 2), its size limited to the speed."""
     speed = min(speed, params.approach_gain * sight.distance)
-    return speed * sight.gx, speed * sight.gy
+    return Step(True, speed * sight.gx, speed * sight.gy, state)
 
 
-def _bypass(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
+@compiled
+def _bypass(params: Any, state: SwitchingState, sight: Sight) -> Step:
     """The free field nearest to the goal's, with the widest margin that leaves one."""
-    standing, moving = sight.standing + sight.edges, sight.moving
     wanted = atan2(sight.gy, sight.gx)
-    rungs = [(margin, params.speed) for margin in params.margins]
-    rungs += [(params.margins[-1], f * params.speed) for f in params.slower]
     close = min(params.standing_horizon * params.speed, sight.distance)
     trapped = False
-    commitment = params.commitment if state.mode in (BYPASS, YIELD) else 0.0
+    bypasses = state.mode == BYPASS or state.mode == YIELD
+    commitment = params.commitment if bypasses else 0.0
     memory = (params.hysteresis, state.track, state.side, commitment, state.heading)
-    away: Step | None = None
-    for rung, (margin, speed) in enumerate(rungs):
+    away = Step(False, 0.0, 0.0, state)
+    for rung in range(len(params.rungs)):
+        margin, speed = params.rungs[rung, 0], params.rungs[rung, 1]
         clearance = params.body_radius + margin
-        if margin == params.margins[-1]:
+        if margin == params.least:
             clearance += 0.5 * params.closed_gap
-        arcs = blocked_arcs(speed, standing, clearance, close / speed)
-        if arcs:
-            choice = nearest_free(arcs, wanted, speed, 0.0, *memory)
-            if choice is None or choice.turn > params.trap_turn:
+        walls = blocked_arcs(speed, sight.solid, clearance, close / speed)
+        if len(walls):
+            turn = nearest_free(walls, wanted, speed, 0.0, *memory).turn
+            if turn > params.trap_turn:
                 trapped = True
                 continue
         full = speed == params.speed
         # On the first rung it is not: that is why it comes here.
         if rung and _is_clear(params, sight, speed, clearance):
-            mode = ATTRACTIVE if full else YIELD
-            new = SwitchingState(mode, best=state.best)
-            return (*_to_goal(params, sight, speed), new)
-        walled = bool(arcs)
-        arcs += blocked_arcs(speed, moving, clearance, params.horizon)
+            new = _anew(ATTRACTIVE if full else YIELD, state.best)
+            return _to_goal(params, sight, speed, new)
+        walkers = blocked_arcs(speed, sight.moving, clearance, params.horizon)
+        arcs = np.concatenate((walls, walkers))
         choice = nearest_free(arcs, wanted, speed, params.behind_bias, *memory)
-        if choice is not None:
-            heading, edge = choice.heading, choice.disc
-            mode = BYPASS if full else YIELD
-            track = max(edge.track, -1.0) if edge is not None else -1.0
-            new = SwitchingState(mode, track, choice.side, state.best, heading=heading)
-            found = speed * cos(heading), speed * sin(heading), new
+        if choice.turn < inf:
+            heading, mode = choice.heading, float(BYPASS if full else YIELD)
+            way = choice.track, choice.side, state.best, heading
+            new = _changed(START, mode, *way)
+            found = Step(True, speed * cos(heading), speed * sin(heading), new)
             # Between things that stand who comes goes where one flees to: what leads
             # away from the goal is left for when nothing leads nearer.
-            if choice.turn <= 0.5 * pi or not walled:
+            if choice.turn <= 0.5 * pi or not len(walls):
                 return found
-            away = away or found
-    if away is not None:
+            if not away.ends:
+                away = found
+    if away.ends:
         return away
     if trapped:
-        met = _meet_group(params, state, sight)
-        if met is not None:
-            return _follow_group(params, met, sight)
+        met, group = _meet_group(params, state, sight)
+        if met:
+            return Step(False, 0.0, 0.0, group)
     return _least_bad(params, state, sight, wanted)
 
 
+@compiled
 def _meet_group(
-    params: SwitchingParams, state: SwitchingState, sight: Sight
-) -> SwitchingState | None:
+    params: Any, state: SwitchingState, sight: Sight
+) -> tuple[bool, SwitchingState]:
     """Begins to follow the group that stands on the ray to the goal, if any."""
     gx, gy, distance, standing = sight.gx, sight.gy, sight.distance, sight.standing
-    clearance = params.body_radius + params.margins[-1]
+    clearance = params.body_radius + params.least
     wide = clearance + 0.5 * params.closed_gap
     member = first_on_ray(gx, gy, standing, wide)
-    if member is None:
-        return None
+    if member < 0:
+        return False, state
     # The side of a bypass that has begun is kept unless it is much longer.
     kept = state.side * pi / 2.0 if state.mode == BYPASS else 0.0
-    side = shorter_side(
-        gx,
-        gy,
-        member,
-        standing,
-        clearance,
-        params.body_radius,
-        params.closed_gap,
-        kept,
-    )
+    rest = params.body_radius, params.closed_gap, kept
+    side = shorter_side(gx, gy, member, standing, clearance, *rest)
     free = free_range(gx, gy, standing, wide, params.vision)
-    return SwitchingState(GROUP, member.track, side, min(distance - free, state.best))
+    best = min(distance - free, state.best)
+    track = read_disc(standing[member]).track
+    return True, _changed(START, float(GROUP), track, side, best, START.heading)
 
 
-def _follow_group(params: SwitchingParams, state: SwitchingState, sight: Sight) -> Step:
+@compiled
+def _follow_group(params: Any, state: SwitchingState, sight: Sight) -> Step:
     """Follows the group's boundary until the goal's ray leads nearer than ever."""
     gx, gy, distance = sight.gx, sight.gy, sight.distance
     standing, moving = sight.standing, sight.moving
-    clearance = params.body_radius + params.margins[-1]
+    clearance = params.body_radius + params.least
     wide = clearance + 0.5 * params.closed_gap
     # What stands near the group's boundary is passed with half the margin.
-    narrow = params.body_radius + 0.5 * params.margins[-1]
-    member = next((o for o in standing if o.track == state.track), None)
-    if member is None:  # out of sight, or a point at an end that is not seen each time
-        spare = params.body_radius + 2.0 * clearance  # nothing passes between
-        member = min(standing, key=_gap, default=None)
-        if member is not None and _gap(member) > spare:
-            member = None
-    if member is None:
-        return _step(params, SwitchingState(best=state.best), sight)
+    narrow = params.body_radius + 0.5 * params.least
+    member = _followed(params, state, standing, clearance)
+    if member < 0:
+        return Step(False, 0.0, 0.0, _anew(ATTRACTIVE, state.best))
     free = free_range(gx, gy, standing, wide, params.vision)
-    if (
-        free > min(distance, params.body_radius)
-        and distance - free < state.best - params.leave_gain
-    ):
-        return _step(params, SwitchingState(LEAVE, best=distance - free), sight)
-    ex, ey, member, straight = way_round(
-        member,
-        state.side,
-        standing,
-        clearance,
-        params.body_radius,
-        params.closed_gap,
-    )
-    state = _count_laps(state._replace(track=member.track), sight, member, clearance)
+    nearer = distance - free < state.best - params.leave_gain
+    if nearer and free > min(distance, params.body_radius):
+        return Step(False, 0.0, 0.0, _anew(LEAVE, distance - free))
+    rest = params.body_radius, params.closed_gap
+    ex, ey, member, straight = way_round(member, state.side, standing, clearance, *rest)
+    state = _count_laps(state, sight, read_disc(standing[member]), clearance)
     if state.mode == UNREACHABLE:
         ex = ey = 0.0
     speed = params.speed
@@ -261,81 +360,103 @@ def _follow_group(params: SwitchingParams, state: SwitchingState, sight: Sight) 
     ahead = min(max(straight / speed, 0.3), 1.0)
     if (
         time_to_enter(vx, vy, moving, clearance) >= params.horizon
-        and time_to_enter(vx, vy, standing + sight.edges, narrow) >= ahead
+        and time_to_enter(vx, vy, sight.solid, narrow) >= ahead
     ):
-        return vx, vy, state
-    arcs = blocked_arcs(speed, moving, clearance, params.horizon)
-    arcs += blocked_arcs(speed, standing + sight.edges, narrow, ahead)
-    wanted = atan2(ey, ex)
-    choice = nearest_free(arcs, wanted, speed, params.behind_bias, 0.0, -1.0, 1.0)
-    if choice is None:
+        return Step(True, vx, vy, state)
+    walkers = blocked_arcs(speed, moving, clearance, params.horizon)
+    walls = blocked_arcs(speed, sight.solid, narrow, ahead)
+    arcs, wanted = np.concatenate((walkers, walls)), atan2(ey, ex)
+    memory = 0.0, -1.0, 1.0, 0.0, 0.0
+    choice = nearest_free(arcs, wanted, speed, params.behind_bias, *memory)
+    if choice.turn == inf:
         return _least_bad(params, state, sight, wanted)
-    return speed * cos(choice.heading), speed * sin(choice.heading), state
+    return Step(True, speed * cos(choice.heading), speed * sin(choice.heading), state)
 
 
+@compiled
+def _followed(
+    params: Any, state: SwitchingState, standing: np.ndarray, clearance: float
+) -> int:
+    """The row of the group's member that is followed, or -1."""
+    nearest, least = -1, inf
+    for i in range(len(standing)):
+        disc = read_disc(standing[i])
+        if disc.track == state.track:
+            return i
+        gap = _gap(disc)
+        if gap < least:
+            nearest, least = i, gap
+    # It is out of sight, or a point at an end that is not seen each time.
+    spare = params.body_radius + 2.0 * clearance  # nothing passes between
+    return nearest if least <= spare else -1
+
+
+@compiled
 def _gap(disc: Disc) -> float:
     """From the body's middle to a disc's surface [m]."""
     return hypot(disc.q_x, disc.q_y) - disc.radius
 
 
-def _leaves_straight(
-    params: SwitchingParams, state: SwitchingState, sight: Sight
-) -> bool:
+@compiled
+def _leaves_straight(params: Any, state: SwitchingState, sight: Sight) -> bool:
     """Whether the body may go on straight to the place for which it left a group."""
     gx, gy, distance = sight.gx, sight.gy, sight.distance
     standing, moving = sight.standing, sight.moving
     if distance <= state.best + params.leave_gain:
         return False
-    clearance = params.body_radius + params.margins[-1]
+    clearance = params.body_radius + params.least
     wide = clearance + 0.5 * params.closed_gap
     if time_to_enter(gx, gy, standing, wide) < params.body_radius:
         return False
-    vx, vy = _to_goal(params, sight, params.speed)
-    return time_to_enter(vx, vy, moving, clearance) >= params.horizon
+    step = _to_goal(params, sight, params.speed, state)
+    return time_to_enter(step.v_x, step.v_y, moving, clearance) >= params.horizon
 
 
+@compiled
 def _count_laps(
     state: SwitchingState, sight: Sight, member: Disc, clearance: float
 ) -> SwitchingState:
     """Notes that the body comes round the group; after two rounds it gives up."""
-    from_hit = hypot(sight.px - state.hit_x, sight.py - state.hit_y)
-    if state.away < 0.0:
+    hit_x, hit_y, away, laps = state.hit_x, state.hit_y, state.away, state.laps
+    from_hit, mode = hypot(sight.px - hit_x, sight.py - hit_y), state.mode
+    if away < 0.0:
         if hypot(member.q_x, member.q_y) < member.radius + 1.2 * clearance:
-            return state._replace(hit_x=sight.px, hit_y=sight.py, away=0.0)
-    elif state.away == 0.0:
+            hit_x, hit_y, away = sight.px, sight.py, 0.0
+    elif away == 0.0:
         if from_hit >= 3.0 * clearance:
-            return state._replace(away=1.0)
+            away = 1.0
     elif from_hit < clearance:
-        laps = state.laps + 1.0
-        mode = UNREACHABLE if laps >= 2.0 else GROUP
-        return state._replace(away=0.0, laps=laps, mode=float(mode))
-    return state
+        away, laps = 0.0, laps + 1.0
+        mode = float(UNREACHABLE if laps >= 2.0 else GROUP)
+    way = (state.side, state.best, hit_x, hit_y, away, laps, state.heading)
+    return SwitchingState(mode, member.track, *way)
 
 
-def _least_bad(
-    params: SwitchingParams, state: SwitchingState, sight: Sight, wanted: float
-) -> Step:
+@compiled
+def _least_bad(params: Any, state: SwitchingState, sight: Sight, wanted: float) -> Step:
     """Where nothing is free: of 16 headings and rest, what meets a surface last."""
-    latest, best = -1.0, (0.0, 0.0)
+    latest, best_x, best_y = -1.0, 0.0, 0.0
     for k in range(17):
         heading = wanted + k * pi / 8.0
         speed = params.speed if k < 16 else 0.0
         vx, vy = speed * cos(heading), speed * sin(heading)
-        t = time_to_enter(vx, vy, sight.discs, params.body_radius)
+        t = _enters(vx, vy, sight, params.body_radius)
         if t > latest:
-            latest, best = min(t, 0.5 * params.horizon), (vx, vy)
-    mode = GROUP if state.mode == GROUP else YIELD
-    return *best, state._replace(mode=float(mode))
+            latest, best_x, best_y = min(t, 0.5 * params.horizon), vx, vy
+    mode = float(GROUP if state.mode == GROUP else YIELD)
+    way = state.track, state.side, state.best, state.heading
+    return Step(True, best_x, best_y, _changed(state, mode, *way))
 
 
-def _slow_down(params: SwitchingParams, sight: Sight, vx: float, vy: float) -> Point:
+@compiled
+def _slow_down(params: Any, sight: Sight, vx: float, vy: float) -> Point:
     """Limits the speed so that the body can stop before what stands ahead of it."""
     speed = hypot(vx, vy)
     if speed < 1e-9:
         return vx, vy
     ex, ey = vx / speed, vy / speed
-    narrow = params.body_radius + 0.5 * params.margins[-1]
-    free = time_to_enter(ex, ey, sight.standing + sight.edges, narrow)
+    narrow = params.body_radius + 0.5 * params.least
+    free = time_to_enter(ex, ey, sight.solid, narrow)
     limit = max(sqrt(2.0 * params.deceleration * free), 0.1 * params.speed)
     if limit >= speed:
         return vx, vy

