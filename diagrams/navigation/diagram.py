@@ -6,7 +6,11 @@ from typing import Any
 
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, RandomSource
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    RandomSource,
+    ZeroOrderHold,
+)
 
 from diagrams.common.wiring import add_blocks, finish
 from diagrams.navigation.scenario import (
@@ -24,10 +28,10 @@ from plants.crowd.walls import segments
 from plants.turtlebot.arena import add_arena
 from plants.turtlebot.lidar import SCAN_NOISE, Lidar
 from plants.turtlebot.odometry import Odometry, OdometryNoise
-from plants.turtlebot.turtlebot import make_turtlebot
+from plants.turtlebot.turtlebot import RobotState, make_turtlebot
 from systems.common.outside import Outside
 from systems.common.signal import size
-from systems.perception.grid_mapping import GridMapping
+from systems.perception.grid_mapping import SCAN_PERIOD, GridMapping
 from systems.perception.tracking import Tracking
 from systems.switching.classical_planner import ClassicalPlanner
 from systems.switching.navigation_planner import PERIOD
@@ -47,7 +51,7 @@ GIVEN = (
     ("noise.output", "perception.noise"),
     ("perception.seen", "planner.seen"),
     ("robot.y0", "planner.robot"),
-    ("robot.y0", "control.robot"),
+    ("robot.y0", "place_told.u"),
 )
 """Perception that is told the truth, with noise at most."""
 SENSED = (
@@ -68,13 +72,15 @@ SENSED = (
     ("tracking.seen", "planner.seen"),
     ("tracking.corners", "planner.corners"),
     ("mapping.place", "planner.robot"),
-    ("mapping.place", "control.robot"),
+    ("mapping.place", "place_told.u"),
 )
 """Perception by lidar and odometry."""
 WIRES = (
     # Planning: one potential, one velocity.
     ("goal.y0", "planner.goal"),
-    # Action: the velocity becomes speed and turn rate.
+    # Action: the velocity becomes speed and turn rate; it is told where the robot is
+    # as often as the planner, and nothing of Python is asked between.
+    ("place_told.y", "control.robot"),
     ("planner.v_R", "control.v_R"),
     ("planner.mode", "control.mode"),
     ("control.command", "robot.u0"),
@@ -129,9 +135,9 @@ def make_planner(scenario: NavigationScenario) -> Any:
     return SwitchingPlanner(switching)
 
 
-def gaussian(signal: Any) -> Any:
-    """A source of the standard normal numbers of a signal."""
-    return RandomSource(RandomDistribution.kGaussian, size(signal), PERIOD)
+def gaussian(signal: Any, period: float = PERIOD) -> Any:
+    """A source of the standard normal numbers of a signal, every period [s]."""
+    return RandomSource(RandomDistribution.kGaussian, size(signal), period)
 
 
 def given_blocks(scenario: NavigationScenario) -> dict[str, Any]:
@@ -147,7 +153,7 @@ def sense_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     if s.lidar.legs:
         tracking = replace(tracking, person=s.tracking.person or PERSON)
     return {
-        "lidar_noise": gaussian(SCAN_NOISE),
+        "lidar_noise": gaussian(SCAN_NOISE, SCAN_PERIOD),
         "lidar": Lidar(s.lidar, segments(s.walls)),
         "odometry_noise": gaussian(OdometryNoise),
         "odometry": Odometry(s.odometry),
@@ -183,6 +189,7 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
         **(sense_blocks(s) if s.senses == "lidar" else given_blocks(s)),
         "goal": ConstantVectorSource(s.goal),
         "planner": make_planner(s),
+        "place_told": ZeroOrderHold(PERIOD, size(RobotState)),
         "control": UnicycleControl(control),
     }
 

@@ -22,6 +22,7 @@ from systems.common.step_block import StepBlock
 RAYS = 360
 """Of a turn, the first straight ahead, counter-clockwise."""
 STEP = 2.0 * pi / RAYS
+COSINES, SINES = np.cos(STEP * np.arange(RAYS)), np.sin(STEP * np.arange(RAYS))
 ASTRIDE, STRIDE, SWING = 0.11, 1.2, 0.25
 """Of a person's legs, in m: from the middle; of two steps; forwards and backwards at a
 walker's 1.3 m/s, less when slower."""
@@ -61,6 +62,13 @@ class LidarParams:
     )
     legs: bool = parameter(False, "whether obstacles are people, seen at their legs")
     leg: float = parameter(0.06, "radius of a leg", "m", least=0.02, most=0.2)
+
+
+@compiled
+def ray(c: float, s: float, k: int) -> tuple[float, float]:
+    """Direction of a ray, by cosine and sine of the lidar's heading."""
+    a, b = COSINES[k % RAYS], SINES[k % RAYS]
+    return c * a - s * b, s * a + c * b
 
 
 @compiled
@@ -115,15 +123,14 @@ def scan_of(
             lx = qx + side * (swing * hx - ASTRIDE * hy)
             ly = qy + side * (swing * hy + ASTRIDE * hx)
             _meet(ranges, robot.theta, lx, ly, params.leg)
-    angles = robot.theta + STEP * np.arange(RAYS)
-    cosines, sines = np.cos(angles), np.sin(angles)
+    ahead, across = cos(robot.theta), sin(robot.theta)
     for i in range(len(params.walls)):
         ax, ay = params.walls[i, 0] - robot.x, params.walls[i, 1] - robot.y
         ex, ey = params.walls[i, 2] - robot.x - ax, params.walls[i, 3] - robot.y - ay
         if ex == 0.0 and ey == 0.0:
             continue
         for k in range(RAYS):
-            c, s = cosines[k], sines[k]
+            c, s = ray(ahead, across, k)
             along = c * ey - s * ex
             if along != 0.0:
                 r, share = (ax * ey - ay * ex) / along, (ax * s - ay * c) / along

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plants.turtlebot.lidar import RAYS, STEP
+from plants.turtlebot.lidar import RAYS, STEP, ray
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import compiled
 from systems.common.signal import reader, row_writer, size
@@ -77,13 +77,14 @@ def circle_of(
     radius = min(near * s / (1.0 - s), params.largest * 2.0)
     d = near + radius
     x, y = place.x + d * cos(bearing), place.y + d * sin(bearing)
+    ahead, across = cos(place.theta), sin(place.theta)
     for k in range(first, last + 1):
         r = scan[k % RAYS, 0]
         if radius > params.largest:
             break  # it is none that moves, and would only grow
         if r > 0.0:
-            a = place.theta + k * STEP
-            gap = hypot(place.x + r * cos(a) - x, place.y + r * sin(a) - y)
+            ex, ey = ray(ahead, across, k)
+            gap = hypot(place.x + r * ex - x, place.y + r * ey - y)
             radius = max(radius, gap - 0.05)
     before, after = scan[(first - 1) % RAYS, 0], scan[(last + 1) % RAYS, 0]
     hidden = 1.0 * (0.0 < before < near) + 2.0 * (0.0 < after < near)
@@ -112,6 +113,7 @@ def clusters(
         jump = abs(scan[k, 0] - scan[k - 1, 0])
         if jump > widest:
             start, widest = k, jump
+    ahead, across = cos(place.theta), sin(place.theta)
     k, end, touches = start, start + RAYS, False
     while k < end:
         if scan[k % RAYS, 0] == 0.0:
@@ -135,9 +137,9 @@ def clusters(
                 elif s > peak:
                     peak, cusp = s, k
                 last, r = k, s
-                a = place.theta + k * STEP
+                ex, ey = ray(ahead, across, k)
                 total += 1
-                odds = stands(params, grid, place.x + s * cos(a), place.y + s * sin(a))
+                odds = stands(params, grid, place.x + s * ex, place.y + s * ey)
                 known += 1 if odds >= SETTLED else 0
                 sure += 1 if odds >= RELIABLE else 0
             k += 1

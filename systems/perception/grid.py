@@ -5,12 +5,12 @@ the points that were hit there: what stands is known to a centimetre, not to a c
 What walks is left out. A cell is forgotten only if rays pass through its mean.
 """
 
-from math import cos, floor, hypot, sin
+from math import atan2, cos, floor, hypot, sin
 from typing import Any
 
 import numpy as np
 
-from plants.turtlebot.lidar import RAYS, STEP
+from plants.turtlebot.lidar import RAYS, STEP, ray
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import compiled
 from systems.perception.signals import CELLS
@@ -20,6 +20,8 @@ HIT, MISS = 0.9, -1.2
 """What a scan adds to the logarithm of the odds."""
 THROUGH = 0.025
 """A ray passes through what is this near to it [m]; along a wall it goes beside it."""
+SHORT = 0.2
+"""So much before what it hits a ray passes through nothing any more [m]."""
 LEAST, MOST = -4.0, 27.0
 OCCUPIED = 1.7
 """Two hits more than passes: something stands there."""
@@ -73,13 +75,13 @@ def absorb(
     new = grid.copy()
     moving = moving[moving[:, 0] >= 0.0]
     hit = np.zeros(len(grid), np.bool_)
-    passed = np.zeros(len(grid), np.bool_)
+    ahead, across = cos(place.theta), sin(place.theta)
     for k in range(RAYS):
         r = scan[k, 0]
         if r == 0.0:
             continue
-        x = place.x + r * cos(place.theta + k * STEP)
-        y = place.y + r * sin(place.theta + k * STEP)
+        ex, ey = ray(ahead, across, k)
+        x, y = place.x + r * ex, place.y + r * ey
         c = cell_of(params, x, y)
         if c < 0 or walks(moving, x, y, 0.15):
             continue
@@ -96,30 +98,46 @@ def absorb(
         if not hit[c]:
             new[c, 0] = min(max(new[c, 0], 0.0) + HIT, MOST)
         hit[c] = True
-    # In cells from here on: the loop's body is passed ten thousand times.
-    px = (place.x - params.left) / params.cell
-    py = (place.y - params.bottom) / params.cell
-    for k in range(RAYS):
-        r = scan[k, 0]
-        # What nothing comes back from is far away, or a dropout, which is rare.
-        far = params.clear if r == 0.0 else min(r - 0.2, params.clear)
-        ex, ey = cos(place.theta + k * STEP), sin(place.theta + k * STEP)
-        # Two rays a cell at three metres: what a ray steps over its neighbours find.
-        for step in range(int(far / (0.8 * params.cell))):
-            along = (step + 0.5) * 0.8
-            i, j = floor(px + along * ex), floor(py + along * ey)
-            if not (0 <= i < CELLS and 0 <= j < CELLS):
-                continue
-            j += i * CELLS
-            if hit[j] or passed[j]:
-                continue
-            if new[j, 0] > 0.0:  # only if it passes through what stood there
-                qx, qy = new[j, 1] - place.x, new[j, 2] - place.y
-                if abs(ex * qy - ey * qx) > THROUGH or ex * qx + ey * qy > far:
-                    continue
-            passed[j] = True
-            new[j, 0] = max(new[j, 0] + MISS, LEAST)
+    _clear(params, new, hit, place, scan)
     return new
+
+
+@compiled
+def _clear(
+    params: Any, grid: np.ndarray, hit: np.ndarray, place: RobotState, scan: np.ndarray
+) -> None:
+    """Makes cells freer that were not hit and through which rays pass.
+
+    Through one where something stood only the ray nearest to it says that it is gone;
+    elsewhere every other ray will do.
+    """
+    cell, reach = params.cell, params.clear / params.cell
+    px, py = (place.x - params.left) / cell, (place.y - params.bottom) / cell
+    ahead, across = cos(place.theta), sin(place.theta)
+    for i in range(max(int(px - reach), 0), min(int(px + reach) + 1, CELLS)):
+        for j in range(max(int(py - reach), 0), min(int(py + reach) + 1, CELLS)):
+            c = i * CELLS + j
+            if grid[c, 0] <= 0.0 or hit[c]:
+                continue
+            qx, qy = grid[c, 1] - place.x, grid[c, 2] - place.y
+            bearing = (atan2(qy, qx) - place.theta) / STEP
+            k, d = round(bearing), hypot(qx, qy)
+            near = d * abs(sin((bearing - k) * STEP)) <= THROUGH
+            if near and d <= _free(params, scan[k % RAYS, 0]):
+                grid[c, 0] = max(grid[c, 0] + MISS, LEAST)
+    for k in range(0, RAYS, 2):
+        ex, ey = ray(ahead, across, k)
+        for step in range(int(_free(params, scan[k, 0]) / cell)):
+            i, j = floor(px + (step + 0.5) * ex), floor(py + (step + 0.5) * ey)
+            if 0 <= i < CELLS and 0 <= j < CELLS and grid[i * CELLS + j, 0] <= 0.0:
+                grid[i * CELLS + j, 0] = LEAST
+
+
+@compiled
+def _free(params: Any, r: float) -> float:
+    """How far [m] a ray of range r passes through nothing."""
+    # What nothing comes back from is far away, or a dropout, which is rare.
+    return params.clear if r == 0.0 else min(r - SHORT, params.clear)
 
 
 @compiled

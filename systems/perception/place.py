@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plants.turtlebot.lidar import RAYS, STEP
+from plants.turtlebot.lidar import RAYS, ray
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.compiled import compiled
 from systems.perception.grid import RELIABLE, cell_of, walks
@@ -150,11 +150,13 @@ def locate(
         a, b, d, ac, bc, f = told
         gx, gy = a * ex + b * ey + ac * et, b * ex + d * ey + bc * et
         gt = ac * ex + bc * ey + f * et
+        ahead, across = cos(theta), sin(theta)
         for k in range(0, RAYS, EVERY):
             r = scan[k, 0]
             if r == 0.0:
                 continue
-            rx, ry = r * cos(theta + k * STEP), r * sin(theta + k * STEP)
+            ux, uy = ray(ahead, across, k)
+            rx, ry = r * ux, r * uy
             c0 = cell_of(params, x + rx, y + ry)
             if c0 < 0 or walks(moving, x + rx, y + ry, 0.15):
                 continue

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from plants.crowd.signals import CAPACITY
-from plants.turtlebot.lidar import RAYS, SCAN, STEP
+from plants.turtlebot.lidar import RAYS, SCAN, ray
 from plants.turtlebot.turtlebot import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
@@ -150,8 +150,9 @@ def sight(
     vision = params[0].vision
     moving = told(params[0], table, dt, robot, vision)
     points = standing(params[0], rows, robot, vision)
+    people = moving[moving[:, 0] >= 0.0]
     for n in range(len(points)):  # where somebody is nothing stands
-        if points[n, 0] >= 0.0 and walks(moving, points[n, 1], points[n, 2], 0.0):
+        if points[n, 0] >= 0.0 and walks(people, points[n, 1], points[n, 2], 0.0):
             points[n, 0] = NOBODY
     return np.concatenate((moving, points)).ravel()
 
@@ -232,7 +233,7 @@ def corners(
     p, robot = params[0], read_robot(place)
     rows, rays = grid.reshape((len(grid) // 3, 3)), scan.reshape((len(scan), 1))
     found = np.zeros((EDGES, CORNER_SIZE))
-    count = 0
+    ahead, across, count = cos(robot.theta), sin(robot.theta), 0
     for k in range(RAYS):
         r = rays[k, 0]
         if r == 0.0 or r > p.vision:
@@ -245,8 +246,8 @@ def corners(
                     open_ = False
                     break
             if open_ and count < EDGES:
-                x = robot.x + r * cos(robot.theta + k * STEP)
-                y = robot.y + r * sin(robot.theta + k * STEP)
+                ex, ey = ray(ahead, across, k)
+                x, y = robot.x + r * ex, robot.y + r * ey
                 if stands(p, rows, x, y) > 0.0:
                     write_corner(found, count, Corner(1.0, x, y))
                     count += 1
