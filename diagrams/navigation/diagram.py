@@ -26,7 +26,7 @@ from plants.crowd.guided_disc import GuidedDisc, GuidedDiscParams, Place
 from plants.crowd.obstacle_motion import ObstacleMotion, obstacle_at
 from plants.crowd.walls import segments
 from plants.turtlebot.arena import add_arena
-from plants.turtlebot.lidar import SCAN_NOISE, Lidar
+from plants.turtlebot.lidar import SCAN, SCAN_NOISE, Lidar
 from plants.turtlebot.odometry import Odometry, OdometryNoise
 from plants.turtlebot.turtlebot import RobotState, make_turtlebot
 from systems.common.outside import Outside
@@ -63,6 +63,7 @@ SENSED = (
     ("odometry_noise.output", "odometry.noise"),
     # Place and grid.
     ("odometry.reckoned", "mapping.reckoned"),
+    ("lidar.scan", "scan_seen.u"),
     ("lidar.scan", "mapping.scan"),
     ("tracking.moving", "mapping.moving"),
     # What moves, and what stands.
@@ -100,7 +101,7 @@ EXPORTS = {
 }
 """What can be logged, and drawn."""
 SENSED_EXPORTS = {
-    "lidar.scan": "lidar.scan",
+    "lidar.scan": "scan_seen.y",  # the last one that it took
     "mapping.place": "mapping.place",
     "mapping.sureness": "mapping.sureness",
     "tracking.moving": "tracking.moving",
@@ -155,6 +156,7 @@ def sense_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     return {
         "lidar_noise": gaussian(SCAN_NOISE, SCAN_PERIOD),
         "lidar": Lidar(s.lidar, segments(s.walls)),
+        "scan_seen": ZeroOrderHold(SCAN_PERIOD, size(SCAN)),
         "odometry_noise": gaussian(OdometryNoise),
         "odometry": Odometry(s.odometry),
         "mapping": GridMapping(mapping),

@@ -49,7 +49,8 @@ def walks(moving: np.ndarray, x: float, y: float, spare: float) -> bool:
     for m in range(len(moving)):
         reach = moving[m, 3] + spare
         qx, qy = x - moving[m, 1], y - moving[m, 2]
-        if moving[m, 0] >= 0.0 and abs(qx) < reach and hypot(qx, qy) < reach:
+        near = abs(qx) < reach and qx * qx + qy * qy < reach * reach
+        if near and moving[m, 0] >= 0.0:
             return True
     return False
 
@@ -154,7 +155,8 @@ def stands(params: Any, grid: np.ndarray, x: float, y: float) -> float:
         k = c + beside
         if k < 0 or k >= len(grid) or grid[k, 0] < max(SETTLED, most):
             continue
-        if hypot(grid[k, 1] - x, grid[k, 2] - y) < params.cell:
+        qx, qy = grid[k, 1] - x, grid[k, 2] - y
+        if qx * qx + qy * qy < params.cell * params.cell:
             most = grid[k, 0]
             if most >= RELIABLE:
                 break
@@ -179,9 +181,8 @@ def standing(
     Returns:
         Rows of `Seen`, (STANDING, 6).
     """
-    found = np.empty((len(grid), 2))
-    count = 0
     reach = int(vision / params.cell) + 2
+    found, count = np.empty(((2 * reach + 1) ** 2, 2)), 0
     i0 = floor((place.x - params.left) / params.cell)
     j0 = floor((place.y - params.bottom) / params.cell)
     for i in range(max(i0 - reach, 0), min(i0 + reach + 1, CELLS)):

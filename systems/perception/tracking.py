@@ -264,7 +264,8 @@ class Tracking(Block):
     Port ``grid`` accepts rows of `Cell`.
     Port ``moving`` emits rows of `Seen`, all that moves.
     Port ``seen`` emits rows of `Seen`: what moves and what stands, within sight.
-    Port ``corners`` emits rows of `Corner`: behind which somebody may be.
+    Port ``corners`` emits rows of `Corner`: behind which somebody may be, of the last
+    scan.
     """
 
     def __init__(
@@ -294,9 +295,7 @@ class Tracking(Block):
         self.signal_out("moving", MOVING, self._calc_moving, now)
         inputs = {self._place.ticket(), self._grid.ticket()}
         self.signal_out("seen", SEEN, self._calc_seen, now | inputs)
-        self.signal_out(
-            "corners", CORNERS, self._calc_corners, inputs | {self._scan.ticket()}
-        )
+        self.state_out("corners", CORNERS, np.zeros(size(CORNERS)))
         self.update_every(SCAN_PERIOD, self._update)
 
     def _state(self, context: Any, group: int) -> np.ndarray:
@@ -315,17 +314,16 @@ class Tracking(Block):
         place, grid = self._place.Eval(context), self._grid.Eval(context)
         return sight(self._constants, *self._now(context), place, grid)
 
-    def _calc_corners(self, context: Any) -> np.ndarray:
-        place, grid = self._place.Eval(context), self._grid.Eval(context)
-        return corners(self._constants, place, grid, self._scan.Eval(context))
-
     def _update(self, context: Any) -> Sequence[Any]:
-        return tracked(
+        place, grid = self._place.Eval(context), self._grid.Eval(context)
+        scan = self._scan.Eval(context)
+        tracks, stamp = tracked(
             self._constants,
             self._state(context, self._tracks),
             self._state(context, self._stamp),
             context.get_time(),
-            self._place.Eval(context),
-            self._grid.Eval(context),
-            self._scan.Eval(context),
+            place,
+            grid,
+            scan,
         )
+        return tracks, stamp, corners(self._constants, place, grid, scan)
