@@ -296,7 +296,7 @@ PAPERS: dict[str, list[Row]] = {
         ),
         Row(
             "3.1.2: kinematic model, control law (headings only)",
-            f"{SWITCH}/unicycle_control.py",
+            f"{SWITCH}/heading_law.py",
             f"{SWITCHED}/test_perception_and_control.py::test_heading_law",
             "`motion`",
             VARIANT,

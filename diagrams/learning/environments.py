@@ -27,7 +27,7 @@ from diagrams.studies import get_study, load_scenario, scenario_of
 from plants.crowd.signals import ROWS, Obstacle
 from plants.snake.inverse_kinematics import tool_postures
 from plants.snake.signals import ToolPose, ToolTarget
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.auto_guidance.fuzzy_arbiter import Weights
 from systems.common.signal import Many, view
 from systems.common.signals import Estimate, Guide, RobotTool, Velocity

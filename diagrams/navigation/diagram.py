@@ -26,14 +26,16 @@ from plants.crowd.guided_disc import GuidedDisc, GuidedDiscParams, Place
 from plants.crowd.obstacle_motion import ObstacleMotion, obstacle_at
 from plants.crowd.walls import segments
 from plants.turtlebot.arena import add_arena
-from plants.turtlebot.lidar import SCAN, SCAN_NOISE, Lidar
+from plants.turtlebot.lidar import SCAN_NOISE, Lidar
 from plants.turtlebot.odometry import Odometry, OdometryNoise
-from plants.turtlebot.turtlebot import RobotState, make_turtlebot
+from plants.turtlebot.signals import RobotState
+from plants.turtlebot.turtlebot import make_turtlebot
 from systems.common.outside import Outside
 from systems.common.signal import size
 from systems.perception.grid_mapping import SCAN_PERIOD, GridMapping
 from systems.perception.tracking import Tracking
 from systems.switching.classical_planner import ClassicalPlanner
+from systems.switching.heading_law import UnicycleControlParams
 from systems.switching.navigation_planner import PERIOD
 from systems.switching.orca_planner import OrcaPlanner
 from systems.switching.perception import Perception
@@ -63,7 +65,6 @@ SENSED = (
     ("odometry_noise.output", "odometry.noise"),
     # Place and grid.
     ("odometry.reckoned", "mapping.reckoned"),
-    ("lidar.scan", "scan_seen.u"),
     ("lidar.scan", "mapping.scan"),
     ("tracking.moving", "mapping.moving"),
     # What moves, and what stands.
@@ -101,7 +102,7 @@ EXPORTS = {
 }
 """What can be logged, and drawn."""
 SENSED_EXPORTS = {
-    "lidar.scan": "scan_seen.y",  # the last one that it took
+    "lidar.scan": "lidar.scan",
     "mapping.place": "mapping.place",
     "mapping.sureness": "mapping.sureness",
     "tracking.moving": "tracking.moving",
@@ -115,6 +116,17 @@ PEERS: dict[str, Callable[[Any], Any]] = {
     "statechart": StatechartPlanner,
 }
 """Planners that need no more of the scenario than their own part."""
+
+
+def control_params(scenario: NavigationScenario) -> UnicycleControlParams:
+    """Of the wheels' control; its limits are the robot's."""
+    robot = scenario.robot
+    return replace(
+        scenario.control,
+        speed=robot.speed,
+        turn_rate=robot.turn_rate,
+        turn_acceleration=robot.turn_acceleration,
+    )
 
 
 def make_planner(scenario: NavigationScenario) -> Any:
@@ -133,7 +145,7 @@ def make_planner(scenario: NavigationScenario) -> Any:
             scenario.switching.standing_speed, 3.0 * scenario.perception.velocity_noise
         ),
     )
-    return SwitchingPlanner(switching)
+    return SwitchingPlanner(switching, control=control_params(scenario))
 
 
 def gaussian(signal: Any, period: float = PERIOD) -> Any:
@@ -156,7 +168,6 @@ def sense_blocks(scenario: NavigationScenario) -> dict[str, Any]:
     return {
         "lidar_noise": gaussian(SCAN_NOISE, SCAN_PERIOD),
         "lidar": Lidar(s.lidar, segments(s.walls)),
-        "scan_seen": ZeroOrderHold(SCAN_PERIOD, size(SCAN)),
         "odometry_noise": gaussian(OdometryNoise),
         "odometry": Odometry(s.odometry),
         "mapping": GridMapping(mapping),
@@ -178,12 +189,6 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
         told = Outside(Place, start, s.obstacles[row].guided, PERIOD)
         disc = GuidedDisc(GuidedDiscParams(period=PERIOD), start, row)
         driver = {"obstacle_outside": told, "driven": disc}
-    control = replace(
-        s.control,
-        speed=s.robot.speed,
-        turn_rate=s.robot.turn_rate,
-        turn_acceleration=s.robot.turn_acceleration,
-    )
     return {
         "robot": make_turtlebot(s.robot, [*s.start, heading(s)]),
         "obstacles": obstacles,
@@ -192,7 +197,7 @@ def make_blocks(scenario: NavigationScenario) -> dict[str, Any]:
         "goal": ConstantVectorSource(s.goal),
         "planner": make_planner(s),
         "place_told": ZeroOrderHold(PERIOD, size(RobotState)),
-        "control": UnicycleControl(control),
+        "control": UnicycleControl(control_params(s)),
     }
 
 

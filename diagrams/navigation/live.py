@@ -9,7 +9,7 @@ from diagrams.navigation.plots import state_names
 from diagrams.navigation.scenario import NavigationScenario
 from plants.crowd.guided_disc import Place
 from plants.crowd.signals import OBSTACLES
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.switching.signals import Mode
 
 AROUND = 1.5

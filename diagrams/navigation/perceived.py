@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from diagrams.common.plots import COLORS, add_axes, new_figure
 from diagrams.navigation.scenario import mapping_params
 from plants.turtlebot.lidar import RAYS, STEP
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.signal import size, view
 from systems.perception.grid import OCCUPIED, absorb
 from systems.perception.grid_mapping import SCAN_PERIOD, constants

@@ -21,11 +21,11 @@ from systems.perception.grid_mapping import GridMappingParams
 from systems.perception.signals import CELLS
 from systems.perception.tracking import TrackingParams
 from systems.switching.classical_planner import ClassicalParams
+from systems.switching.heading_law import UnicycleControlParams
 from systems.switching.orca_planner import OrcaParams
 from systems.switching.perception import PerceptionParams
 from systems.switching.statechart_planner import StatechartParams
 from systems.switching.switching_state import SwitchingParams
-from systems.switching.unicycle_control import UnicycleControlParams
 
 PLANNERS = ("switching", "statechart", "classical", "orca")
 SENSES = ("given", "lidar")

@@ -17,7 +17,7 @@ from diagrams.navigation.plots import plots, state_names
 from diagrams.navigation.scenario import NavigationScenario, companions
 from plants.crowd.signals import OBSTACLES
 from plants.turtlebot.lidar import SCAN
-from plants.turtlebot.turtlebot import Command, RobotState
+from plants.turtlebot.signals import Command, RobotState
 from systems.perception.signals import MOVING, Sureness
 from systems.switching.signals import Mode, PlanarVelocity
 
@@ -42,6 +42,7 @@ LAMPS = (
     (0.20, 0.60, 0.90, 1.0),  # leave
     (0.60, 0.30, 0.75, 1.0),  # yield
     (0.10, 0.10, 0.10, 1.0),  # unreachable
+    (0.98, 0.45, 0.65, 1.0),  # evade
 )
 """Colours of the lamp above the robot, by the planner's state."""
 

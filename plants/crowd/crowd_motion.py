@@ -15,7 +15,7 @@ import numpy as np
 from plants.crowd.orca import orca_towards
 from plants.crowd.signals import CAPACITY, OBSTACLES, Obstacle
 from plants.crowd.social_force import social_force_towards
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import Rules, check, parameter

@@ -18,7 +18,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from plants.common.looks import DARK, GREEN, RED, STEEL, illustration
 from plants.crowd.signals import OBSTACLES
 from plants.crowd.walls import WallParams, segments
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.block import Block
 from systems.common.signal import view
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from plants.crowd.signals import OBSTACLES, Obstacle
 from plants.crowd.walls import segments
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Many, reader

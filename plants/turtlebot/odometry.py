@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import cos, sin
 from typing import Annotated, Any, NamedTuple
 
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
 from systems.common.signal import Field

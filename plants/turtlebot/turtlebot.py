@@ -5,31 +5,13 @@ It is a `SymbolicVectorSystem`: Drake integrates it in C++.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, NamedTuple
+from typing import Any
 
 from pydrake.symbolic import Variable, cos, max, min, sin
 from pydrake.systems.primitives import SymbolicVectorSystem
 
+from plants.turtlebot.signals import Command, RobotState
 from systems.common.parameter import check, parameter
-from systems.common.signal import Field
-
-
-class RobotState(NamedTuple):
-    """The body: where it is and how it moves. World frame W, plane z = 0."""
-
-    x: Annotated[float, Field("m", "place", 0.0)]
-    y: Annotated[float, Field("m", "place", 0.0)]
-    theta: Annotated[float, Field("rad", "heading", 0.0)]
-    v: Annotated[float, Field("m/s", "speed, negative backwards", 0.5)]
-    omega: Annotated[float, Field("rad/s", "turn rate", 0.0)]
-
-
-class Command(NamedTuple):
-    """What the body is to do."""
-
-    speed: Annotated[float, Field("m/s", "speed to take", 0.5)]
-    turn_rate: Annotated[float, Field("rad/s", "turn rate to take", 0.0)]
-
 
 BODIES: dict[str, dict[str, float]] = {
     "turtlebot2": {},

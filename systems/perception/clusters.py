@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plants.turtlebot.lidar import RAYS, STEP, ray
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled
 from systems.common.signal import reader, row_writer, size
 from systems.perception.grid import RELIABLE, SETTLED, stands

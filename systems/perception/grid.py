@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from plants.turtlebot.lidar import RAYS, STEP, ray
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled
 from systems.perception.signals import CELLS
 from systems.switching.signals import STANDING

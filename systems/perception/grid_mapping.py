@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plants.turtlebot.lidar import SCAN
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter

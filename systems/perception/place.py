@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plants.turtlebot.lidar import RAYS, ray
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled
 from systems.perception.grid import RELIABLE, cell_of, walks
 from systems.perception.signals import CELLS

@@ -14,7 +14,7 @@ import numpy as np
 
 from plants.crowd.signals import CAPACITY
 from plants.turtlebot.lidar import RAYS, SCAN, ray
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import Rules, check, parameter

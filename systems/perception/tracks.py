@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from plants.turtlebot.lidar import RAYS, STEP
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled
 from systems.common.signal import reader, row_writer, size
 from systems.perception.clusters import SEEN as WHOLE

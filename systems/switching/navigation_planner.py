@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.block import Block
 from systems.common.compiled import compiled
 from systems.common.parameter import check

@@ -14,7 +14,7 @@ import numpy as np
 
 from plants.crowd.orca import orca_velocity
 from plants.crowd.signals import Obstacle
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.parameter import parameter
 from systems.switching.arcs import DISC_SIZE, Disc, time_to_enter
 from systems.switching.body import BodyParams

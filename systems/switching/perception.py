@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from plants.crowd.signals import OBSTACLES, Obstacle
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled, packed
 from systems.common.parameter import check, parameter
 from systems.common.signal import finiteness, reader, size

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from math import acos, atan2, cos, hypot, sin
 from typing import Any, NamedTuple
 
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.parameter import parameter
 from systems.switching.body import BodyParams
 from systems.switching.fields import attractive_field, helicoid_field

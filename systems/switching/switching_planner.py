@@ -5,10 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import compiled
 from systems.common.signal import finiteness
 from systems.common.step_block import StepBlock
+from systems.switching.evasion import Body
+from systems.switching.heading_law import UnicycleControlParams
+from systems.switching.heading_law import constants as law_constants
 from systems.switching.navigation_planner import NO_CORNERS, PERIOD, velocity
 from systems.switching.signals import (
     CORNERS,
@@ -19,6 +22,7 @@ from systems.switching.signals import (
 )
 from systems.switching.switching_rules import planned
 from systems.switching.switching_state import (
+    EVADE,
     START,
     SwitchingParams,
     SwitchingState,
@@ -31,6 +35,7 @@ finite_robot, finite_goal = finiteness(RobotState), finiteness(Goal)
 @compiled
 def _update(
     params: Any,
+    law: Any,
     held: PlanarVelocity,
     mode: Mode,
     last_goal: Goal,
@@ -47,10 +52,14 @@ def _update(
     if goal.x != last_goal.x or goal.y != last_goal.y:
         state = START
     place, to = (robot.x, robot.y), (goal.x, goal.y)
-    step = planned(params, state, place, velocity(robot), to, seen, corners)
+    body = Body(robot.theta, robot.v, robot.omega)
+    v = velocity(robot)
+    step = planned(params, law, state, place, v, to, seen, corners, body)
     new = step.state
     retreat, outrun = 1.0 if step.retreat else 0.0, 1.0 if step.outrun else 0.0
-    mode = Mode(new.mode, new.track, new.side, retreat, outrun)
+    evades = new.flee_x != 0.0 or new.flee_y != 0.0
+    state_now = float(EVADE) if evades else new.mode
+    mode = Mode(state_now, new.track, new.side, retreat, outrun)
     return PlanarVelocity(step.v_x, step.v_y), mode, goal, new
 
 
@@ -71,9 +80,17 @@ class SwitchingPlanner(StepBlock):
     """
 
     def __init__(
-        self, params: SwitchingParams | None = None, period: float = PERIOD
+        self,
+        params: SwitchingParams | None = None,
+        period: float = PERIOD,
+        control: UnicycleControlParams | None = None,
     ) -> None:
         """Makes the block.
+
+        Args:
+            params: Parameters.
+            period: In s.
+            control: Of the wheels' control, as far as evasions reckon with it.
 
         Raises:
             ParameterError: If a parameter is out of range.
@@ -82,7 +99,10 @@ class SwitchingPlanner(StepBlock):
         self.period = period
         self.declare_update(
             _update,
-            [constants(params or SwitchingParams())],
+            [
+                constants(params or SwitchingParams()),
+                law_constants(control or UnicycleControlParams()),
+            ],
             {"robot": RobotState, "seen": SEEN, "goal": Goal, "corners": CORNERS},
             {
                 "v_R": PlanarVelocity(0.0, 0.0),

@@ -29,12 +29,15 @@ from systems.switching.arcs import (
     write_disc,
 )
 from systems.switching.caution import cautious, read_corner
+from systems.switching.evasion import HOLONOMIC, Body, Evasion, evasion
 from systems.switching.groups import (
     first_on_ray,
     free_range,
     shorter_side,
     way_round,
 )
+from systems.switching.heading_law import UnicycleControlParams
+from systems.switching.heading_law import constants as law_constants
 from systems.switching.signals import Corner, Seen
 from systems.switching.switching_state import (
     ATTRACTIVE,
@@ -53,6 +56,7 @@ from systems.switching.switching_state import (
 
 Point = tuple[float, float]
 read_seen = reader(Seen)
+LAW = law_constants(UnicycleControlParams())[0]
 CHANGES = 8
 """How often a step may go from one state to another; then it takes the least bad."""
 
@@ -74,6 +78,7 @@ def plan(
     goal: Point,
     obstacles: Sequence[Seen],
     corners: Sequence[Corner] = (),
+    body: Body = HOLONOMIC,
 ) -> Plan:
     """One step of the switching planner.
 
@@ -85,6 +90,7 @@ def plan(
         goal: Where it shall go [m].
         obstacles: The obstacles in sight.
         corners: Edges behind which somebody may be.
+        body: How it stands; one that goes any way at once by default.
 
     Returns:
         The velocity to take, and what to remember.
@@ -99,7 +105,8 @@ def plan(
     if lost:
         raise ValueError(f"obstacles {lost}: not finite")
     record, state = constants(params)[0], SwitchingState(*map(float, state))
-    return planned(record, state, place, velocity, goal, *rows(obstacles, corners))
+    told = rows(obstacles, corners)
+    return planned(record, LAW, state, place, velocity, goal, *told, body)
 
 
 def rows(
@@ -113,25 +120,29 @@ def rows(
 @compiled
 def planned(
     params: Any,
+    law: Any,
     state: SwitchingState,
     place: Point,
     velocity: Point,
     goal: Point,
     seen: np.ndarray,
     corners: np.ndarray,
+    body: Body,
 ) -> Plan:
     """As `plan`, of numbers that are finite.
 
     Args:
         params: A record of `constants`.
+        law: One of the wheels' control law.
         state: State after the step before.
         place: Where the body is [m].
         velocity: How it moves [m/s].
         goal: Where it shall go [m].
         seen: Rows of `Seen`; those of a track below 0 hold nothing.
         corners: Rows of `Corner`; not all need be there.
+        body: How the body stands.
     """
-    ahead = params.response
+    ahead, flee_x, flee_y = params.response, state.flee_x, state.flee_y
     (px, py), (vx, vy), (gx, gy) = place, velocity, goal
     px, py = px + ahead * vx, py + ahead * vy
     gx, gy = gx - px, gy - py
@@ -149,14 +160,19 @@ def planned(
         discs[:end],
         discs[end:],
     )
-    vx, vy, state = _step(params, state, sight)
+    vx, vy, state = _step(params, _fleeing(state, 0.0, 0.0), sight)
     if stand:
         vx, vy = _slow_down(params, sight, vx, vy)
     vx, vy = cautious(params, sight, corners, vx, vy)
     clearance = params.body_radius + params.margin
     meets = time_to_enter(0.0, 0.0, sight.moving, clearance)
     outrun = fastest >= params.speed * params.speed
-    return Plan(vx, vy, state, outrun, meets < params.retreat_time)
+    wanted = Evasion(False, vx, vy, meets < params.retreat_time)
+    if params.foresight > 0.0 and isfinite(body.theta):
+        wanted = evasion(params, law, sight, body, wanted, flee_x, flee_y)
+    if wanted.needed:
+        state = _fleeing(state, wanted.v_x, wanted.v_y)
+    return Plan(wanted.v_x, wanted.v_y, state, outrun, wanted.retreat)
 
 
 @compiled
@@ -239,7 +255,7 @@ def _changed(
 ) -> SwitchingState:
     """A state that remembers the same way about a group."""
     hit, laps = (state.hit_x, state.hit_y, state.away), state.laps
-    return SwitchingState(mode, track, side, best, *hit, laps, heading)
+    return SwitchingState(mode, track, side, best, *hit, laps, heading, 0.0, 0.0)
 
 
 @compiled
@@ -429,7 +445,14 @@ def _count_laps(
         away, laps = 0.0, laps + 1.0
         mode = float(UNREACHABLE if laps >= 2.0 else GROUP)
     way = (state.side, state.best, hit_x, hit_y, away, laps, state.heading)
-    return SwitchingState(mode, member.track, *way)
+    return SwitchingState(mode, member.track, *way, 0.0, 0.0)
+
+
+@compiled
+def _fleeing(s: SwitchingState, v_x: float, v_y: float) -> SwitchingState:
+    """The state with an evasion under way."""
+    way = s.track, s.side, s.best, s.hit_x, s.hit_y, s.away, s.laps, s.heading
+    return SwitchingState(s.mode, *way, v_x, v_y)
 
 
 @compiled

@@ -10,9 +10,9 @@ from systems.common.compiled import packed
 from systems.common.parameter import Rules, check, parameter
 from systems.switching.body import BodyParams
 
-ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE = range(6)
-MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable")
-"""Names of the planner's states, by number."""
+ATTRACTIVE, BYPASS, GROUP, LEAVE, YIELD, UNREACHABLE, EVADE = range(7)
+MODES = ("attractive", "bypass", "group", "leave", "yield", "unreachable", "evade")
+"""Names of the planner's states, by number; the last one leaves the others waiting."""
 
 
 @dataclass
@@ -132,6 +132,13 @@ class SwitchingParams(BodyParams):
         least=0.0,
         most=2.0,
     )
+    foresight: float = parameter(
+        3.0,
+        "evasions are carried on for so long; 0 for none",
+        "s",
+        least=0.0,
+        most=10.0,
+    )
     approach_gain: float = parameter(
         2.0, "speed per distance, near the goal", "1/s", above=0.0, most=20.0
     )
@@ -175,7 +182,7 @@ class Sight(NamedTuple):
 
 
 class SwitchingState(NamedTuple):
-    """What the planner remembers from step to step: nine numbers."""
+    """What the planner remembers from step to step: eleven numbers."""
 
     # One of MODES.
     mode: float = 0.0
@@ -194,6 +201,9 @@ class SwitchingState(NamedTuple):
     laps: float = 0.0
     # Heading of the last bypass [rad].
     heading: float = 0.0
+    # Velocity of the evasion under way [m/s], 0 for none.
+    flee_x: float = 0.0
+    flee_y: float = 0.0
 
 
 START = SwitchingState()

@@ -16,7 +16,7 @@ from diagrams.common.metrics import WALL_CLOCK
 from diagrams.common.run import prepare, simulate_diagram
 from diagrams.navigation.diagram import make_navigation_diagram
 from diagrams.studies import scenario_of
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.switching.navigation_planner import (
     PERIOD,
     NavigationPlanner,

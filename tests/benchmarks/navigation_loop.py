@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plants.crowd.walls import wall_distance
-from systems.switching.signals import Corner, Seen
-from systems.switching.unicycle_control import (
+from systems.switching.evasion import Body
+from systems.switching.heading_law import (
     UnicycleControlParams,
     constants,
     heading_law,
 )
+from systems.switching.signals import Corner, Seen
 from tests.benchmarks.navigation_scenes import Frame, Robot, Scene
 from tests.benchmarks.sensed import Sensed, Senses
 
@@ -32,6 +33,7 @@ class Now(NamedTuple):
     vy: float
     seen: list[Seen]
     corners: list[Corner]
+    omega: float = 0.0  # rad/s
 
     @property
     def place(self) -> tuple[float, float]:
@@ -42,6 +44,12 @@ class Now(NamedTuple):
     def v(self) -> tuple[float, float]:
         """Its velocity [m/s]."""
         return self.vx, self.vy
+
+    @property
+    def body(self) -> Body:
+        """How it stands, for who reckons with its limits."""
+        v = self.vx * cos(self.theta) + self.vy * sin(self.theta)
+        return Body(self.theta, v, self.omega)
 
 
 Step = Callable[[Now], Command]
@@ -154,7 +162,7 @@ def run(
             place, seen, hiding = sensed.at((x, y, theta), (vx, vy), frame, k * dt)
         astray = max(astray, hypot(place[0] - x, place[1] - y))
         start = perf_counter()
-        wanted = step(Now(*place, vx, vy, seen, hiding))
+        wanted = step(Now(*place, vx, vy, seen, hiding, speeds[1]))
         walls.append(perf_counter() - start)
         if robot.holonomic:
             size = hypot(wanted[0], wanted[1])

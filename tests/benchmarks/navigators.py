@@ -12,20 +12,21 @@ import numpy as np
 from plants.crowd.signals import Obstacle
 from plants.crowd.social_force import social_force_towards
 from systems.switching.classical_planner import ClassicalParams, summed_fields
+from systems.switching.evasion import HOLONOMIC
 from systems.switching.orca_planner import OrcaParams, orca_step, retreats
 from systems.switching.statechart_planner import (
     Manoeuvre,
     StatechartParams,
     statechart_step,
 )
-from systems.switching.switching_rules import planned, rows
+from systems.switching.switching_rules import LAW, planned, rows
 from systems.switching.switching_state import (
     SwitchingParams,
     SwitchingState,
     constants,
 )
 from tests.benchmarks.dynamic_window import dynamic_window
-from tests.benchmarks.navigation_loop import Command, Now, Planner, Step
+from tests.benchmarks.navigation_loop import Command, Now, Planner, Step, control_law
 from tests.benchmarks.navigation_scenes import Scene
 
 MARGIN = 0.1
@@ -43,11 +44,13 @@ def switching(scene: Scene) -> Step:
         response=0.0 if robot.holonomic else SwitchingParams.response,
     )
     record, state = constants(params)[0], SwitchingState()
+    law = LAW if robot.holonomic else control_law(robot)
 
     def step(now: Now) -> Command:
         nonlocal state
         told = rows(now.seen, now.corners)
-        result = planned(record, state, now.place, now.v, scene.goal, *told)
+        body = HOLONOMIC if robot.holonomic else now.body
+        result = planned(record, law, state, now.place, now.v, scene.goal, *told, body)
         state = result.state
         return result.v_x, result.v_y, result.retreat
 

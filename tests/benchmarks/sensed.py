@@ -10,7 +10,7 @@ from plants.crowd.walls import segments
 from plants.turtlebot.lidar import RAYS, LidarParams, scan_of
 from plants.turtlebot.lidar import constants as lidar_constants
 from plants.turtlebot.odometry import Odometer, OdometryNoise, OdometryParams, reckon
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import packed
 from systems.common.signal import size
 from systems.perception.grid_mapping import (

@@ -5,7 +5,7 @@ from math import hypot
 
 import pytest
 
-from systems.switching.unicycle_control import heading_law
+from systems.switching.heading_law import heading_law
 from tests.benchmarks.built_scenes import KINDS, built
 from tests.benchmarks.dynamic_window import _wanted, dynamic_window
 from tests.benchmarks.navigation_loop import control_law, run

@@ -5,7 +5,7 @@ import pytest
 
 from plants.crowd.walls import WallParams, segments
 from plants.turtlebot.lidar import RAYS, LidarParams, constants, scan_of
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.parameter import ParameterError
 
 ROOM = [WallParams([[-2, -2], [3, -2], [3, 2], [-2, 2], [-2, -2]], True)]

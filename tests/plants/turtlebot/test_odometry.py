@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plants.turtlebot.odometry import Odometer, OdometryNoise, OdometryParams, reckon
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import packed
 
 EXACT = {"scale": 0.0, "slip": 0.0, "drift": 0.0, "turn": 0.0}

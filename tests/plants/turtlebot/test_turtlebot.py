@@ -10,13 +10,8 @@ from pydrake.systems.analysis import (
 )
 import pytest
 
-from plants.turtlebot.turtlebot import (
-    BODIES,
-    Command,
-    RobotState,
-    TurtlebotParams,
-    make_turtlebot,
-)
+from plants.turtlebot.signals import Command, RobotState
+from plants.turtlebot.turtlebot import BODIES, TurtlebotParams, make_turtlebot
 from systems.common.parameter import check
 
 

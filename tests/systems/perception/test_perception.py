@@ -8,7 +8,7 @@ import pytest
 from plants.crowd.walls import WallParams, segments
 from plants.turtlebot.lidar import RAYS, LidarParams, scan_of
 from plants.turtlebot.lidar import constants as lidar_constants
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.signal import size, view
 from systems.perception import grid_mapping, tracking, tracks
 from systems.perception.clusters import BETWEEN, LEG, Cluster, people, seen_as
@@ -175,6 +175,42 @@ def test_nobody_is_tracked_twice():
         world.look(rows=[(2.0 - 0.04 * k, 0.5, 0.25, -0.4, 0.0)])
         assert len(world.moving()) <= (1 if k != 7 else 2)
     assert len(world.all()) == 1
+
+
+def test_what_was_seen_for_a_moment_is_believed_in_for_a_moment():
+    thing, before_it = (2.5, 0.0, 0.3, 0.0, 0.0), (1.2, 0.0, 0.4, 0.0, 0.0)
+    kept = []
+    for scans in (3, 20):
+        world = World()
+        for _ in range(scans):
+            world.look(rows=[thing])
+        for _ in range(6):
+            world.look(rows=[thing, before_it])
+        kept.append(any(hypot(t.x - 2.5, t.y) < 0.3 for t in world.all()))
+    assert kept == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("known", "hidden", "cut", "born"),
+    [
+        (0, WHOLE, 0, 1),
+        (1, WHOLE, 0, 1),
+        (2, WHOLE, 0, 0),
+        (1, LEG, 0, 0),
+        (1, 0, 1, 0),
+    ],
+)
+def test_what_is_new_or_slow_is_tracked_anew_but_nothing_that_stood(
+    known, hidden, cut, born
+):
+    world = World()
+    found = np.array([Cluster(2.0, 0.0, 0.3, hidden, known, 1.7, -0.1, 0.1, cut, 0.0)])
+    table = world.tracks.reshape(-1, tracks.TRACK_SIZE)
+    nobody = np.full(len(table), -1)
+    rows, _ = tracking.updated(
+        world.k_track, table, found, nobody, np.array(CENTRE), np.zeros(RAYS), 0.0
+    )
+    assert (rows[:, 0] > 0.0).sum() == born
 
 
 def test_walls_are_nobody_and_what_stood_there_before_is_forgotten():

@@ -5,7 +5,13 @@ from math import cos, hypot, inf, pi, sin
 import numpy as np
 import pytest
 
-from systems.switching.arcs import ARC_SIZE, Disc, blocked_arcs, nearest_free, time_to_enter
+from systems.switching.arcs import (
+    ARC_SIZE,
+    Disc,
+    blocked_arcs,
+    nearest_free,
+    time_to_enter,
+)
 from systems.switching.fields import involute_field
 
 RNG = np.random.default_rng(4)
@@ -31,7 +37,10 @@ def test_a_heading_is_blocked_exactly_if_it_enters_the_circle(fastest):
             vx, vy = 0.5 * cos(heading), 0.5 * sin(heading)
             time = time_to_enter(vx, vy, np.array([obstacle]), 0.3)
             # A hair's breadth beside an edge either answer is right.
-            near = [time_to_enter(vx, vy, np.array([obstacle]), 0.3 + e) for e in (-0.01, 0.01)]
+            near = [
+                time_to_enter(vx, vy, np.array([obstacle]), 0.3 + e)
+                for e in (-0.01, 0.01)
+            ]
             if all(np.isfinite(t) == np.isfinite(time) for t in near):
                 assert within(arcs, heading) == np.isfinite(time)
 

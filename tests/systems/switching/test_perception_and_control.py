@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from plants.crowd.signals import CAPACITY, Obstacle
-from plants.turtlebot.turtlebot import RobotState
+from plants.turtlebot.signals import RobotState
 from systems.common.compiled import packed
 from systems.common.signal import example, flat
 from systems.switching.classical_planner import (
@@ -15,6 +15,8 @@ from systems.switching.classical_planner import (
     field_sum,
     summed_fields,
 )
+from systems.switching.heading_law import UnicycleControlParams, constants
+from systems.switching.heading_law import heading_law as compiled_law
 from systems.switching.orca_planner import (
     OrcaParams,
     OrcaPlanner,
@@ -25,12 +27,7 @@ from systems.switching.perception import Perception, PerceptionParams, perceive
 from systems.switching.signals import NOISE, SEEN, Mode, Noise, PlanarVelocity, Seen
 from systems.switching.statechart_planner import StatechartPlanner
 from systems.switching.switching_planner import SwitchingPlanner
-from systems.switching.unicycle_control import (
-    UnicycleControl,
-    UnicycleControlParams,
-    constants,
-)
-from systems.switching.unicycle_control import heading_law as compiled_law
+from systems.switching.unicycle_control import UnicycleControl
 from tests.loosely import loosely
 
 ROWS = len(SEEN.names)

@@ -9,9 +9,10 @@ from time import perf_counter
 import numpy as np
 import pytest
 
+from systems.switching.evasion import Body
 from systems.switching.signals import Corner, Seen
 from systems.switching.switching_planner import SwitchingPlanner
-from systems.switching.switching_rules import plan, planned, rows
+from systems.switching.switching_rules import LAW, plan, planned, rows
 from systems.switching.switching_state import (
     ATTRACTIVE,
     BYPASS,
@@ -212,7 +213,7 @@ def test_bad_parameters_are_refused(change, message):
 def test_speed(count, limit):
     # Medians over scattered worlds; four times the limit, for a busy machine.
     rng, record = np.random.default_rng(7), constants(PARAMS)[0]
-    rest = SwitchingState(), (0.0, 0.0), (0.0, 0.0), (8.0, 0.0)
+    rest = LAW, SwitchingState(), (0.0, 0.0), (0.0, 0.0), (8.0, 0.0)
     walls = []
     for _ in range(200):
         places = rng.uniform(-3.0, 3.0, (count, 2))
@@ -224,6 +225,6 @@ def test_speed(count, limit):
         ]
         told = rows(seen, [])
         start = perf_counter()
-        planned(record, *rest, *told)
+        planned(record, *rest, *told, Body(0.0, 0.0, 0.0))
         walls.append(perf_counter() - start)
     assert statistics.median(walls) < 4.0 * limit
