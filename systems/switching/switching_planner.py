@@ -13,13 +13,7 @@ from systems.switching.evasion import Body
 from systems.switching.heading_law import UnicycleControlParams
 from systems.switching.heading_law import constants as law_constants
 from systems.switching.navigation_planner import NO_CORNERS, PERIOD, velocity
-from systems.switching.signals import (
-    CORNERS,
-    SEEN,
-    Goal,
-    Mode,
-    PlanarVelocity,
-)
+from systems.switching.signals import CORNERS, SEEN, Goal, Mode, PlanarVelocity
 from systems.switching.switching_rules import planned
 from systems.switching.switching_state import (
     EVADE,
@@ -69,12 +63,12 @@ class SwitchingPlanner(StepBlock):
     Sections 2.2 and 3.2 of the thesis, with the involute-helicoid potential in the
     obstacle's frame; see `systems.switching.switching_rules`.
 
+    Where an input is not finite, the robot is to stand.
+
     Port ``robot`` accepts the `RobotState`.
     Port ``seen`` accepts rows of `Seen`.
     Port ``goal`` accepts the `Goal`; another one starts afresh.
     Port ``corners`` accepts rows of `Corner`; slower where somebody may step out.
-    Where an input is not finite, the robot is to stand.
-
     Port ``v_R`` emits the `PlanarVelocity` to take.
     Port ``mode`` emits the `Mode`; its states are `MODES`.
     """
@@ -96,7 +90,6 @@ class SwitchingPlanner(StepBlock):
             ParameterError: If a parameter is out of range.
         """
         super().__init__()
-        self.period = period
         self.declare_update(
             _update,
             [
