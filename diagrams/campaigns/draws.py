@@ -13,6 +13,7 @@ from systems.common.geometry import (
     closest_points,
     norm,
     plus,
+    scaled,
     sub,
     unit,
 )
@@ -123,6 +124,28 @@ def _outside(trocar: Vector, tip: Vector) -> Vector:
     return along(trocar, _OUTSIDE, unit(sub(trocar, tip)))
 
 
+def _way(tape: Tape, g: Vector) -> tuple[Vector, Vector]:
+    """Where the robot starts and where it is wanted."""
+    for pose in tape.tries("pose", _TRIES):
+        start, goal = _tip(pose, "start", g, 0.55), _tip(pose, "goal", g, 0.5)
+        if norm(sub(goal, start)) >= _LEAST_WAY:
+            break
+    return start, goal
+
+
+def _surgeons(tape: Tape, g_o: Vector) -> Vector:
+    """The trocar of S, not beside the hand's."""
+    for surgeon in tape.tries("surgeon", _TRIES):
+        g_s = _trocar(surgeon, "trocar", _APART, 0.15)
+        if norm(sub(g_s, g_o)) > _APART:
+            break
+    return g_s
+
+
+def _direction(tape: Tape, key: str) -> Vector:
+    return unit(vector([tape.normal(f"{key}.{axis}") for axis in "xyz"]))
+
+
 def operation(tape: Tape) -> dict[str, Any]:
     """A delivery of gauze: where the tools are, and how the surgeon's hand moves.
 
@@ -136,10 +159,7 @@ def operation(tape: Tape) -> dict[str, Any]:
     """
     g, patient = (0.0, 0.0, 0.0), _patient(tape)
     g_0 = _at_start(patient)
-    for pose in tape.tries("pose", _TRIES):
-        start, goal = _tip(pose, "start", g, 0.55), _tip(pose, "goal", g, 0.5)
-        if norm(sub(goal, start)) >= _LEAST_WAY:
-            break
+    start, goal = _way(tape, g)
     for hand in tape.tries("hand", _TRIES):
         g_o = _trocar(hand, "trocar", _APART, 0.13)
         times, points = _wander(hand, g_o, [start, goal], 1.0)
@@ -154,10 +174,7 @@ def operation(tape: Tape) -> dict[str, Any]:
             and _apart_outside(points, g_o, [start, goal])
         ):
             break
-    for surgeon in tape.tries("surgeon", _TRIES):
-        g_s = _trocar(surgeon, "trocar", _APART, 0.15)
-        if norm(sub(g_s, g_o)) > _APART:
-            break
+    g_s = _surgeons(tape, g_o)
     eye = _eye(g_o, g_s)
     return {
         "robot.p_WP": list(start),
@@ -169,6 +186,44 @@ def operation(tape: Tape) -> dict[str, Any]:
         "obstacle.points": [list(p) for p in points],
         "camera.p_WG": eye,
         "camera.p_WS": [goal[0], goal[1], goal[2]],
+        **patient,
+    }
+
+
+def theatre(tape: Tape) -> dict[str, Any]:
+    """A synthetic hand at up to 250 mm/s where everything breathes.
+
+    Robot and target are anywhere that `operation` has them; the hand begins beside the
+    robot's way, and goes where it likes. The tracker is 2 mm and half a degree off, the
+    first guess of the fulcrum 10 mm.
+    """
+    g, patient = (0.0, 0.0, 0.0), _breath(tape)
+    g_0 = _at_start(patient)
+    start, goal = _way(tape, g)
+    for hand in tape.tries("hand", _TRIES):
+        g_o = _trocar(hand, "trocar", _APART, 0.13)
+        tip = _near(hand, [start, goal])
+        is_clear = closest_points(g_0, start, g_o, tip).distance > _CLEAR
+        if is_clear and _apart_outside([tip], g_o, [start], g_0):
+            break
+    g_s = _surgeons(tape, g_o)
+    off, turn = _direction(tape, "registration"), _direction(tape, "registration.turn")
+    return {
+        "robot.p_WP": list(start),
+        "target.p_WG": list(g_s),
+        "target.times": [0.0],
+        "target.points": [list(goal)],
+        "target.lag": tape.uniform("target.lag", 0.0, 0.5),
+        "obstacle.p_WG": list(g_o),
+        "obstacle.times": [0.0],
+        "obstacle.points": [list(tip)],
+        "obstacle.hand.seed": 1 + tape.whole("hand.seed", 1_000_000),
+        "obstacle.lag": tape.uniform("hand.lag", 0.0, 0.5),
+        "camera.p_WG": _eye(g_o, g_s),
+        "camera.p_WS": list(goal),
+        "first_guess": list(scaled(0.01, _direction(tape, "guess"))),
+        "tracker.shift": list(scaled(0.002, off)),
+        "tracker.turn": list(scaled(0.0087, turn)),
         **patient,
     }
 
@@ -202,19 +257,25 @@ def _eye(g_o: Vector, g_s: Vector) -> list[float]:
     return list(ring[rooms.index(max(rooms))])
 
 
-def _patient(tape: Tape) -> dict[str, Any]:
-    """How the patient breathes, how wrong the first guess is, what is not seen."""
-    off = tape.uniform("guess.size", 0.0, 0.02)
-    way = unit(vector([tape.normal(f"guess.{axis}") for axis in "xyz"]))
+def _breath(tape: Tape) -> dict[str, Any]:
+    """How the patient breathes."""
     across = tape.uniform("breath.across", 0.0, 0.006)
     turn = tape.uniform("breath.turn", 0.0, 2.0 * pi)
     deep = tape.uniform("breath.deep", 0.0, 0.009)
-    values: dict[str, Any] = {
-        "first_guess": [off * x for x in way],
+    return {
         "wall_motion.breathing": [across * cos(turn), across * sin(turn), deep],
         "wall_motion.rate": tape.uniform("breath.rate", 0.15, 0.4),
         "wall_motion.phase": tape.uniform("breath.phase", 0.0, 1.0),
         "wall_motion.wave": ("sine", "ventilator")[tape.whole("breath.wave", 2)],
+    }
+
+
+def _patient(tape: Tape) -> dict[str, Any]:
+    """How the patient breathes, how wrong the first guess is, what is not seen."""
+    off = tape.uniform("guess.size", 0.0, 0.02)
+    values: dict[str, Any] = {
+        "first_guess": list(scaled(off, _direction(tape, "guess"))),
+        **_breath(tape),
         "abdomen.stiffness": tape.uniform("wall.stiffness", 300.0, 1200.0),
         "tracker.body.noise": tape.uniform("tracker.noise", 5e-5, 4e-4),
         "obstacle.tremor_rms": tape.uniform("hand.tremor", 0.0, 1.5e-4),
@@ -237,5 +298,6 @@ def _patient(tape: Tape) -> dict[str, Any]:
 DRAWS: dict[str, Callable[[Tape], dict[str, Any]]] = {
     "": lambda tape: {},
     "operation": operation,
+    "theatre": theatre,
     "crowd": crowd,
 }

@@ -131,7 +131,11 @@ def seen(name: str, registered: bool) -> list[tuple[str, str]]:
     if not registered:
         return [(measured, wanted)]
     mended = f"registration.{name}"
-    return [(measured, f"{mended}_measured"), (mended, wanted)]
+    return [
+        (measured, f"{mended}_measured"),
+        (mended, wanted),
+        ("registration.alignment", f"{name}_estimator.alignment"),
+    ]
 
 
 REGISTERED = (

@@ -26,6 +26,7 @@ from systems.auto_guidance.fuzzy_arbiter import Weights
 from systems.bypass.tool_bypass import Way
 from systems.common.signal import Many
 from systems.common.signals import (
+    Alignment,
     ClearanceStatus,
     Estimate,
     Force,
@@ -39,7 +40,6 @@ from systems.common.signals import (
 from systems.motion.joint_commands import Status
 from systems.motion.sight import Sight
 from systems.motion.tool_navigation import StopCode
-from systems.sensing.registration import Alignment
 
 SIGNALS = {
     "planner.guide": Guide,

@@ -34,6 +34,19 @@ class TrackedShaft(NamedTuple):
     valid: Annotated[float, Field("1", "1 if it was seen, else 0", 1.0)]
 
 
+class Alignment(NamedTuple):
+    """Error of the tracker's registration, as it is believed."""
+
+    t: Annotated[Vector, Field("m", "shift at the origin of W", (1e-3, 0.0, 0.0))]
+    theta: Annotated[Vector, Field("rad", "rotation vector", (0.0, 0.01, 0.0))]
+    sigma: Annotated[float, Field("m", "of a point of the cavity", 1e-4)]
+    residual: Annotated[float, Field("m", "of the last frame, smoothed", 1e-4)]
+
+
+ALIGNED = Alignment((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0)
+"""Of a tracker that is taken for registered exactly."""
+
+
 class Estimate(NamedTuple):
     """What is known of a tool and where it goes."""
 

@@ -15,7 +15,7 @@ tools' frames are then moved back.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,22 +27,13 @@ from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, cross, dot, sub, unit, xyz
 from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tip_frame
-from systems.common.signal import Field, Vector, finiteness, flat
-from systems.common.signals import TrackedShaft
+from systems.common.signal import Vector, finiteness, flat
+from systems.common.signals import Alignment, TrackedShaft
 from systems.common.step_block import wired
 from systems.sensing.optical_tracker import MarkerBody
 
 finite_state, finite_frame = finiteness(ArmState), finiteness(TrackedShaft)
 _IN_TIME = 2e-3  # s, between a frame's exposure and the arm's pose that it is held to
-
-
-class Alignment(NamedTuple):
-    """Error of the registration, as it is believed."""
-
-    t: Annotated[Vector, Field("m", "shift at the origin of W", (1e-3, 0.0, 0.0))]
-    theta: Annotated[Vector, Field("rad", "rotation vector", (0.0, 0.01, 0.0))]
-    sigma: Annotated[float, Field("m", "of a point of the cavity", 1e-4)]
-    residual: Annotated[float, Field("m", "of the last frame, smoothed", 1e-4)]
 
 
 class Seen(NamedTuple):

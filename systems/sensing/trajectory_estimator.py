@@ -15,7 +15,13 @@ from systems.common.compiled import compiled, packed
 from systems.common.geometry import along, dot, norm, scaled, sub, unit
 from systems.common.parameter import Rules, check, parameter, part
 from systems.common.signal import Vector, finiteness
-from systems.common.signals import Estimate, Point, TrackedShaft
+from systems.common.signals import (
+    ALIGNED,
+    Alignment,
+    Estimate,
+    Point,
+    TrackedShaft,
+)
 from systems.common.step_block import StepBlock
 from systems.sensing.optical_tracker import NEVER, MarkerBody
 from systems.sensing.shaft_fulcrum import (
@@ -201,13 +207,14 @@ def absorb(params: Any, x: State, m: TrackedShaft) -> State:
 
 
 @compiled
-def predict(params: Any, x: State, t: float) -> Estimate:
+def predict(params: Any, x: State, t: float, shared: float = 0.0) -> Estimate:
     """The estimate at time `t` in s, see the port of `TrajectoryEstimator`.
 
     Args:
         params: A record of `constants`.
         x: The state.
         t: Time in s.
+        shared: Standard deviation of an error that all tools' frames share, m.
     """
     age = max(t - x.time, 0.0)
     p, v, a = _predict_mean(params, x, min(age, params.age_limit))
@@ -216,7 +223,7 @@ def predict(params: Any, x: State, t: float) -> Estimate:
     sigma_p, sigma_v, sigma_a = 1.0, 1.0, 1.0
     if x.time != NEVER:
         pp, _, _, vv, _, aa = _predict_covariance(params, x, age)
-        pp += x.shared + params.var_tremor
+        pp += x.shared + params.var_tremor + shared * shared
         sigma_p, sigma_v, sigma_a = math.sqrt(pp), math.sqrt(vv), math.sqrt(aa)
     from_future = x.time > t + LATEST  # whatever it says is not of this tool's past
     known = (
@@ -228,12 +235,16 @@ def predict(params: Any, x: State, t: float) -> Estimate:
 
 @compiled
 def _step(
-    params: Any, state: State, time: float, measurement: TrackedShaft
+    params: Any,
+    state: State,
+    time: float,
+    measurement: TrackedShaft,
+    alignment: Alignment,
 ) -> tuple[State, Estimate]:
     after = state
     if measurement.time <= time + LATEST:
         after = absorb(params, state, measurement)
-    return after, predict(params, after, time)
+    return after, predict(params, after, time, alignment.sigma)
 
 
 class TrajectoryEstimator(StepBlock):
@@ -247,6 +258,8 @@ class TrajectoryEstimator(StepBlock):
     a frame that is late by more than the age limit starts the trajectory anew.
 
     Port ``measurement`` accepts a `TrackedShaft`.
+    Port ``alignment`` accepts the tracker's `Alignment`, whose sigma is no noise, but
+    wrong all the same; exact without a wire.
     Port ``estimate`` emits the `Estimate`, predicted to the time of the evaluation;
     sigma_p is of the true tip, tremor included, sigma_v and sigma_a are of the
     trajectory, tremor excluded.
@@ -266,8 +279,9 @@ class TrajectoryEstimator(StepBlock):
         self.declare_step(
             _step,
             [constants(params)],
-            {"measurement": TrackedShaft},
+            {"measurement": TrackedShaft, "alignment": Alignment},
             initial(params),
             {"estimate": Estimate},
             params.period,
+            defaults={"alignment": ALIGNED},
         )

@@ -9,7 +9,7 @@ from plants.arm.signals import ArmState
 from systems.common.parameter import ParameterError
 from systems.common.serial_arm import tip_frame
 from systems.common.signal import flat, view
-from systems.common.signals import Shaft, TrackedShaft
+from systems.common.signals import Alignment, Shaft, TrackedShaft
 from systems.sensing.optical_tracker import (
     MarkerNoise,
     OpticalTrackerParams,
@@ -18,7 +18,6 @@ from systems.sensing.optical_tracker import (
     misplaced,
 )
 from systems.sensing.registration import (
-    Alignment,
     Registration,
     RegistrationParams,
     moved_back,

@@ -17,8 +17,10 @@ from plants.surgeon.tool_motion import (
     tremor_motion,
     waypoint_motion,
 )
+from systems.bypass import obstacle_tools
+from systems.bypass.obstacle_tools import Margins
 from systems.common.signal import Vector, flat, vector, view
-from systems.common.signals import Estimate, Shaft, TrackedShaft
+from systems.common.signals import ALIGNED, Estimate, Shaft, TrackedShaft
 from systems.sensing import optical_tracker
 from systems.sensing.optical_tracker import (
     TOOLS,
@@ -241,6 +243,26 @@ def test_nothing_is_known_before_the_first_frame():
     estimate = predict(constants(params)[0], initial(params), 0.0)
     assert np.isfinite(flat(estimate)).all()
     assert estimate.known == 0.0
+
+
+def test_what_the_registration_is_unsure_of_widens_the_margin():
+    """An error that all tools' frames share is in no frame's noise."""
+    dut = TrajectoryEstimator(TrajectoryEstimatorParams(fulcrum=G))
+    context = dut.CreateDefaultContext()
+    dut.GetInputPort("measurement").FixValue(context, flat(frame(THERE, 0.5)))
+    context.SetTime(0.5)
+    output = dut.GetOutputPort("estimate")
+    sure = view(Estimate, output.Eval(context).copy())
+    told = ALIGNED._replace(sigma=1e-3)
+    dut.GetInputPort("alignment").FixValue(context, flat(told))
+    unsure = view(Estimate, output.Eval(context).copy())
+    assert unsure.sigma_p == pytest.approx(math.hypot(sure.sigma_p, 1e-3))
+    assert vector(unsure.p) == vector(sure.p) and unsure.known == 1.0
+    record = obstacle_tools.constants(Margins())[0]
+    wider = obstacle_tools.margin(record, unsure) - obstacle_tools.margin(record, sure)
+    assert wider > 1e-3
+    dut.GetInputPort("alignment").FixValue(context, flat(told._replace(sigma=0.01)))
+    assert view(Estimate, output.Eval(context).copy()).known == 0.0
 
 
 def test_block_has_the_frame_in_the_estimate_of_the_same_instant():
