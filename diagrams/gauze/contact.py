@@ -85,6 +85,7 @@ YIELD_WIRES = (
     ("tool_wrench.shaft", "touch_watch.shaft"),
     ("fulcrum_estimator.estimate", "touch_watch.estimate"),
     ("passive_wrist.permission", "touch_watch.permission"),
+    ("go_to_target.guide", "touch_watch.guide"),
     ("wrench_watch.believed", "touch_watch.believed"),
     ("touch_watch.told", "fulcrum_estimator.wrench"),
     ("clearance_constraint.v_safe", "touch_yield.v_safe"),

@@ -82,7 +82,7 @@ class JointCommandsParams:
     )
     # Where not all can be had: a tip that lags costs time, a fulcrum missed force.
     fulcrum_first: float = parameter(
-        5.0, "weight of the fulcrum's motion against the turning", least=1, most=1e3
+        20.0, "weight of the fulcrum's motion against the turning", least=1, most=1e3
     )
     shortfall: float = parameter(
         0.005, "error of the tool's velocity that is told", "m/s", least=0, most=0.05

@@ -20,6 +20,10 @@ tells d = r . (u x f_t) / |f_t|^2 (a Kalman filter of one number). With d the mo
 alone parts the two, f_t = r x u / d: where that is surer than the prediction, what is
 left is told to the estimator, and a wall that moves during the push is followed.
 A push so near to the trocar that its moment cannot be told is the wall's.
+
+A wrist that unloads the wall makes f zero while both push: there only r is left of it.
+Where the tracker has a tool beside the shaft, d is known before it pushes, and r tells
+the push by itself.
 """
 
 from dataclasses import dataclass
@@ -42,7 +46,14 @@ from systems.common.geometry import (
 )
 from systems.common.parameter import check, parameter
 from systems.common.signal import Field, Vector, finiteness, flat, size, view
-from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
+from systems.common.signals import (
+    Fulcrum,
+    Guide,
+    Permission,
+    ShaftMotion,
+    Wrench,
+    finite_guide,
+)
 from systems.common.step_block import StepBlock, wired
 from systems.common.stops import Stop
 from systems.sensing.wrench_kernel import SILENCE
@@ -50,6 +61,8 @@ from systems.sensing.wrench_kernel import SILENCE
 finite_shaft, finite_wrench = finiteness(ShaftMotion), finiteness(Wrench)
 _STILL = (0.0, 0.0, 0.0)
 _PROBING = float(Stop.PROBING)
+_FAR = 1.0
+"""Of a tool that is not there, m."""
 
 
 class Touched(NamedTuple):
@@ -92,7 +105,7 @@ class Waits(NamedTuple):
 class Told(NamedTuple):
     """What the estimator said last: the fulcrum, m and m/s; its sigmas, m; K, N/m.
 
-    And 1 if it is known, else 0.
+    And 1 if it is known, else 0; where a tool is nearest to the shaft, m, and how near.
     """
 
     p: Vector
@@ -101,6 +114,11 @@ class Told(NamedTuple):
     sigma_along: float
     stiffness: float
     known: float
+    M_R: Vector
+    rho: float
+
+
+_NOTHING_TOLD = Told(_STILL, _STILL, 0.0, 0.0, 1.0, 0.0, _STILL, _FAR)
 
 
 @dataclass
@@ -128,6 +146,15 @@ class TouchWatchParams:
     brief: float = parameter(0.06, "for so long without a moment", "s", least=0, most=2)
     below: float = parameter(
         0.06, "where a push is expected, with that deviation", "m", above=0, most=0.3
+    )
+    beside: float = parameter(
+        0.007, "axes of a tool that may be pushing", "m", least=0, most=0.05
+    )
+    place: float = parameter(
+        0.008, "deviation of where it would", "m", above=0, most=0.1
+    )
+    sure_beside: float = parameter(
+        1.5, "for `sure` and `suspect` while one is there", least=0, most=20
     )
     nearest: float = parameter(
         0.02, "below which its share is not told", "m", above=0, most=0.3
@@ -221,13 +248,21 @@ def watch_touch(
         d, var_d = c.below, c.below**2
     wall = along(pull, told.stiffness, across(b, u))
     push = sub(f, wall)
-    lever = cross(u, push)
-    d, var_d = placed(
-        c, d, var_d, lever, left, noise + d * told.stiffness * told.sigma_across
-    )
-    wrong = max(c.depth, told.sigma_along) * norm(push)
-    margin = wrong + c.sure * doubt
-    moment = dot(left, lever) / max(norm(lever), 1e-9)
+    sure, suspect, loaded = c.sure, c.suspect, norm(push)
+    where = dot(u, sub(told.M_R, p_0))
+    if told.rho < c.beside and where > c.nearest:
+        sure, suspect, loaded = c.sure_beside, c.sure_beside, norm(f)
+        d, var_d = where, c.place**2
+        push = scaled(-1.0 / d, cross(u, left))
+        moment = norm(left)
+    else:
+        lever = cross(u, push)
+        d, var_d = placed(
+            c, d, var_d, lever, left, noise + d * told.stiffness * told.sigma_across
+        )
+        moment = dot(left, lever) / max(norm(lever), 1e-9)
+    wrong = max(c.depth, told.sigma_along) * loaded
+    margin = wrong + sure * doubt
     touched, free, held = past.touched, 0.0, past.held
     if touched > 0.5:
         if moment < 0.5 * margin or norm(push) < 0.5 * c.least:
@@ -236,7 +271,7 @@ def watch_touch(
     elif norm(push) > c.least and moment > margin:
         touched = 1.0
     change = norm(sub(force, wall))
-    doubtful = moment - wrong > c.suspect * doubt and norm(push) > 0.5 * c.least
+    doubtful = moment - wrong > suspect * doubt and norm(push) > 0.5 * c.least
     if doubtful or norm(sub(force, past.f)) > c.sudden:
         held += c.period
     elif change < 0.5 * c.sudden:
@@ -283,8 +318,9 @@ class TouchWatch(StepBlock):
     Port ``wrench`` accepts the `Wrench` of the sensor.
 
     Port ``estimate`` accepts the fulcrum estimator's `Fulcrum`, and port ``permission``
-    the passive wrist's `Permission`: while it probes nothing is known. Those of the
-    instant before are used, since they in turn are made of the wall's share.
+    the passive wrist's `Permission`: while it probes nothing is known; port ``guide``
+    accepts the planner's `Guide`: which tool is near, and where. Those of the instant
+    before are used, since they in turn are made of the wall's share.
 
     Port ``believed`` accepts what of ``wall`` is believed.
 
@@ -310,6 +346,7 @@ class TouchWatch(StepBlock):
         ]
         estimate = self.signal_in("estimate", Fulcrum)
         permission = self.signal_in("permission", Permission)
+        guide = self.signal_in("guide", Guide)
         believed = self.signal_in("believed", Wrench)
         silence = flat(SILENCE)
         outputs = {"wall": Wrench, "touch": Touched}
@@ -317,7 +354,7 @@ class TouchWatch(StepBlock):
         taken = [ShaftMotion, Wrench]
         run = wired(watch_touch, 1, [Past, Told], taken, gives, False)
         self.DeclareDiscreteState(np.zeros(size(Past)))
-        self.DeclareDiscreteState(flat(Told(_STILL, _STILL, 0.0, 0.0, 1.0, 0.0)))
+        self.DeclareDiscreteState(flat(_NOTHING_TOLD))
 
         def calc(context: Any) -> np.ndarray:
             states = [context.get_discrete_state(k).value() for k in range(2)]
@@ -347,6 +384,7 @@ class TouchWatch(StepBlock):
             said = view(Fulcrum, estimate.Eval(context))
             probes = view(Permission, permission.Eval(context)).code == _PROBING
             known = not probes and said.sigma_ln_stiffness < params.known
+            near = view(Guide, guide.Eval(context))
             told = Told(
                 said.p,
                 said.v,
@@ -354,6 +392,8 @@ class TouchWatch(StepBlock):
                 said.sigma_along,
                 said.stiffness,
                 float(known),
+                near.M_R,
+                near.rho if finite_guide(near) else _FAR,
             )
             return [step.Eval(context)[:last], flat(told)]
 

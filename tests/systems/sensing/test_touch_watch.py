@@ -5,7 +5,7 @@ import pytest
 
 from systems.common.geometry import cross
 from systems.common.signal import example, flat, view
-from systems.common.signals import Fulcrum, Permission, ShaftMotion, Wrench
+from systems.common.signals import Fulcrum, Guide, Permission, ShaftMotion, Wrench
 from systems.common.stops import Stop
 from systems.sensing.touch_watch import Touched, TouchWatch, TouchWatchParams
 
@@ -17,7 +17,11 @@ FOUND = example(Fulcrum)._replace(p=(0.0, 0.0, 0.0), sigma_ln_stiffness=0.05)
 PERIOD = TouchWatchParams().period
 
 
-def after(rows, probing=False, found=FOUND, wall=None):
+FAR = example(Guide)._replace(rho=0.05)
+BESIDE = FAR._replace(M_R=(0.0, 0.0, -0.045), rho=0.0055)
+
+
+def after(rows, probing=False, found=FOUND, wall=None, guide=FAR):
     """The outputs after readings: pairs of a force in N and where it acts below S.
 
     Args:
@@ -25,6 +29,7 @@ def after(rows, probing=False, found=FOUND, wall=None):
         probing: Whether the wrist does.
         found: What the estimator says, who follows what the wall does.
         wall: The wall's force beside that of each reading, N.
+        guide: Where the tracker has a tool.
     """
     wall = np.zeros(len(rows)) if wall is None else wall
     dut = TouchWatch(TouchWatchParams(length=LENGTH))
@@ -33,6 +38,7 @@ def after(rows, probing=False, found=FOUND, wall=None):
     for name, value in (
         ("shaft", SHAFT),
         ("permission", Permission(1.0, code)),
+        ("guide", guide),
     ):
         dut.GetInputPort(name).FixValue(context, flat(value))
     rng, told = np.random.default_rng(2), []
@@ -113,6 +119,33 @@ def test_what_the_wall_does_meanwhile_is_told_apart_by_the_moment():
     assert view(Wrench, told).f[0] == pytest.approx(1.0, abs=0.2)
     lever = view(Wrench, told).m[1] / view(Wrench, told).f[0]
     assert abs(lever) == pytest.approx(DEPTH, abs=0.02)
+
+
+@pytest.mark.parametrize(("guide", "felt"), [(BESIDE, True), (FAR, False)])
+def test_a_push_that_the_wall_bears_is_felt_where_a_tool_was_seen(guide, felt):
+    """The wrist has unloaded the sum of both: no force is left, but its moment."""
+    rows = CALM + [(0.8, DEPTH + 0.045)] * 60
+    borne = np.r_[np.zeros(120), np.full(60, -0.8)]
+    rows = after(rows, wall=borne, guide=guide)
+    touched = [view(Touched, row[0]).touched for row in rows]
+    assert not any(touched[:120])
+    assert any(touched[120:132]) == felt
+    if felt:
+        said = view(Touched, rows[-1][0])
+        assert said.f[0] == pytest.approx(0.8, abs=0.15)
+        assert said.share == pytest.approx(0.045 / (LENGTH - DEPTH), abs=0.02)
+
+
+def test_a_tool_that_stands_beside_the_shaft_does_not_push():
+    """Though the wall breathes, and the fulcrum's depth is wrong."""
+    n = round(10.0 / PERIOD)
+    rows = after(
+        [(0.0, DEPTH)] * n,
+        found=FOUND._replace(p=(0.0, 0.0, 0.015), sigma_along=0.01),
+        wall=0.3 * np.sin(2.0 * np.pi * 0.25 * PERIOD * np.arange(n)),
+        guide=BESIDE,
+    )
+    assert not any(view(Touched, row[0]).touched for row in rows)
 
 
 def test_next_to_the_trocar_it_is_the_walls():
