@@ -139,7 +139,7 @@ def seen(name: str, registered: bool) -> list[tuple[str, str]]:
 
 
 REGISTERED = (
-    ("tool_shaft.shaft", "optical_tracker.robot"),
+    ("marker_shaft.shaft", "optical_tracker.robot"),
     ("optical_tracker.robot_measured", "registration.robot_measured"),
     ("plant.pa10_state", "registration.arm_state"),
 )

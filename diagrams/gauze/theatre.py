@@ -23,9 +23,9 @@ def add_theatre(builder: Any, scenario: Any, bedside: Bedside | None = None) -> 
     """
     bedside = bedside or add_bedside(builder, scenario, hold=contact.hold(scenario))
     plant, scene_graph = bedside.systems["plant"], bedside.systems["scene_graph"]
-    if scenario.registration.active and "tool_shaft" not in bedside.systems:
-        bedside.systems["tool_shaft"] = add_tool_shaft(
-            builder, plant, bedside.instrument
+    if scenario.registration.active:
+        bedside.systems["marker_shaft"] = add_tool_shaft(
+            builder, plant, bedside.instrument, markers=True
         )
     tools = [(tool.name, tool.role) for tool in scenario.tools]
     looks = PosedToolsParams(

@@ -32,10 +32,18 @@ class ToolShaft(Block):
         return np.concatenate([X_WM.translation() + self._length * u, u])
 
 
-def add_tool_shaft(builder: Any, plant: Any, instrument: Any) -> ToolShaft:
-    """Adds the block as `tool_shaft` and wires it to the plant."""
+def add_tool_shaft(
+    builder: Any, plant: Any, instrument: Any, markers: bool = False
+) -> ToolShaft:
+    """Adds the block as `tool_shaft` and wires it to the plant.
+
+    Or as `marker_shaft`, the line that markers on the handle tell: it does not bend.
+    """
+    name, body = "tool_shaft", instrument.shaft
+    if markers:
+        name, body = "marker_shaft", instrument.body
     block: ToolShaft = builder.AddNamedSystem(
-        "tool_shaft", ToolShaft(int(instrument.shaft.index()), instrument.length)
+        name, ToolShaft(int(body.index()), instrument.length)
     )
     builder.Connect(plant.GetOutputPort("body_poses"), block.GetInputPort("body_poses"))
     return block
