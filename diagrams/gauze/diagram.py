@@ -145,6 +145,9 @@ REGISTERED = (
 )
 """The tracker sees the robot's own tool as well."""
 
+KEPT_CLEAR = ("clearance_constraint.status", "joint_commands.clearance")
+"""Where R must touch no tool, its tip does not lag near one."""
+
 TOLD = (
     ("fulcrum.y0", "robot_location.fulcrum"),
     ("fulcrum.y0", "joint_commands.fulcrum"),
@@ -331,6 +334,8 @@ def wiring(
         ]
         exports |= wrist_exports(scenario)
     wires = contact.yielding(scenario, wires)
+    if scenario.clearance_constraint.active:
+        wires.append(KEPT_CLEAR)
     if scenario.registration.active:
         wires += REGISTERED
         exports |= {"tracker.alignment": "registration.alignment"}

@@ -37,7 +37,14 @@ from systems.common.geometry import (
 from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tool_state
 from systems.common.signal import Field, finiteness, flat, reader, size, view
-from systems.common.signals import FREE, Permission, Point, ToolMotion
+from systems.common.signals import (
+    CALM,
+    FREE,
+    ClearanceStatus,
+    Permission,
+    Point,
+    ToolMotion,
+)
 from systems.common.step_block import wired
 from systems.common.stops import Stop
 from systems.motion.joint_velocity import free_velocity, joint_velocity, product
@@ -84,6 +91,10 @@ class JointCommandsParams:
     fulcrum_first: float = parameter(
         20.0, "weight of the fulcrum's motion against the turning", least=1, most=1e3
     )
+    # No tool is touched, first of all: with 5 the tip lags least.
+    fulcrum_evading: float = parameter(
+        5.0, "the same while a tool is near", least=1, most=1e3
+    )
     shortfall: float = parameter(
         0.005, "error of the tool's velocity that is told", "m/s", least=0, most=0.05
     )
@@ -110,7 +121,7 @@ class JointCommandsParams:
 
 
 _STILL = (0.0, 0.0, 0.0)
-_FREE = flat(FREE)
+_FREE, _CALM = flat(FREE), flat(CALM)
 _YIELD = 0.7
 _GIVE_WAY = (float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST))
 
@@ -317,6 +328,8 @@ class JointCommands(Block):
 
     Port ``permission`` accepts the passive wrist's `Permission`; free without a wire.
 
+    Port ``clearance`` accepts the constraint's `ClearanceStatus`; calm without a wire.
+
     Port ``set_point`` emits the `ArmState` that the arm's servos take.
 
     Port ``posture`` emits the commanded `Posture`.
@@ -341,15 +354,19 @@ class JointCommands(Block):
         self._arm = read_arm(plant, plant.GetFrameByName(INSTRUMENT_TIP))
         set_point = SetPoint(arm, params.period)
         nominal = np.array(posture, float)
-        self._constants = packed(
-            params,
-            nominal=nominal,
-            low=plant.GetPositionLowerLimits() + params.joint_margin,
-            high=plant.GetPositionUpperLimits() - params.joint_margin,
-            speed=params.joint_speed * plant.GetVelocityUpperLimits(),
-            acceleration=params.joint_torque * accelerations(plant, nominal),
-            lead=set_point.lead,
-            compliance=set_point.compliance,
+        self._constants, self._evading = (
+            packed(
+                params,
+                fulcrum_first=first,
+                nominal=nominal,
+                low=plant.GetPositionLowerLimits() + params.joint_margin,
+                high=plant.GetPositionUpperLimits() - params.joint_margin,
+                speed=params.joint_speed * plant.GetVelocityUpperLimits(),
+                acceleration=params.joint_torque * accelerations(plant, nominal),
+                lead=set_point.lead,
+                compliance=set_point.compliance,
+            )
+            for first in (params.fulcrum_first, params.fulcrum_evading)
         )
         signals = {"posture": Posture, "set_point": ArmState, "status": Status}
         sizes = [*map(size, signals.values()), 1, JOINTS, 1]
@@ -361,6 +378,7 @@ class JointCommands(Block):
         self._fulcrum = self.signal_in("fulcrum", Point)
         self._measured = self.signal_in("arm_state", ArmState)
         self._permission = self.signal_in("permission", Permission)
+        self._clearance = self.signal_in("clearance", ClearanceStatus)
         _, _, _, weight = tool_state(self._arm[0], nominal)
         start = command(self._constants[0], nominal, np.zeros(JOINTS), weight, 0.0)
         for (name, signal), state in zip(signals.items(), start, strict=True):
@@ -368,7 +386,8 @@ class JointCommands(Block):
         self.DeclareDiscreteState(1)  # s that it stays limp
         self.DeclareDiscreteState(JOINTS)  # its velocities, rad/s
         ports = (self._tool, self._fulcrum, self._measured, self._permission)
-        reads = {self.xd_ticket(), self.time_ticket(), *(p.ticket() for p in ports)}
+        reads = {self.xd_ticket(), self.time_ticket(), self._clearance.ticket()}
+        reads |= {port.ticket() for port in ports}
         self._next = self.cached("next", self._calc_next, reads)
         self.signal_out(
             "next",
@@ -390,7 +409,9 @@ class JointCommands(Block):
         fulcrum = told(self._fulcrum, lambda: view(ToolMotion, tool).tip)
         measured = told(self._measured, lambda: np.concatenate([q, q]))
         permission = told(self._permission, lambda: _FREE)
-        constants, arm = self._constants, self._arm
+        clearance = view(ClearanceStatus, told(self._clearance, lambda: _CALM))
+        evades = clearance.near > 0.5
+        constants, arm = self._evading if evades else self._constants, self._arm
         step = self._step(
             constants, arm, q, rest, before, time, tool, fulcrum, measured, permission
         )

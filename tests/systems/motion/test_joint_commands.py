@@ -17,7 +17,7 @@ from plants.arm.controller_plant import (
 )
 from plants.arm.parameters import READY_POSTURE
 from systems.common.signal import flat, size, vector
-from systems.common.signals import Permission, ToolMotion
+from systems.common.signals import CALM, Permission, ToolMotion
 from systems.common.stops import Stop
 from systems.motion import joint_commands
 from systems.motion.joint_commands import LIMP, JointCommands, JointCommandsParams
@@ -209,6 +209,20 @@ def test_where_not_all_can_be_had_the_fulcrum_comes_first():
     last = [off_fulcrum(row[0]) for row in follow(circle, 2.0, params)]
     assert max(first) < 1.2e-3
     assert max(last) > 4.0 * max(first)
+
+
+def test_near_a_tool_the_tip_lags_less():
+    """No tool is touched, before the wall is not loaded."""
+    params = JointCommandsParams(joint_speed=0.05)
+    lag, off = [], []
+    for near in (0.0, 1.0):
+        told = {"fulcrum": np.zeros(3), "clearance": flat(CALM._replace(near=near))}
+        rows = follow(circle, 1.0, params, told)
+        tips = [kinematics(row[0])[1] for row in rows]
+        wanted = [circle((k + 1) / 120).tip for k in range(len(rows))]
+        lag.append(np.linalg.norm(np.subtract(tips, wanted), axis=1).max())
+        off.append(max(off_fulcrum(row[0]) for row in rows))
+    assert lag[1] < 0.8 * lag[0] and off[1] > off[0]
 
 
 def test_an_arm_that_does_not_follow_goes_limp():
