@@ -36,7 +36,15 @@ from systems.common.geometry import (
 )
 from systems.common.parameter import check, parameter
 from systems.common.serial_arm import read_arm, tool_state
-from systems.common.signal import Field, finiteness, flat, reader, size, view
+from systems.common.signal import (
+    Field,
+    columns,
+    finiteness,
+    flat,
+    reader,
+    size,
+    view,
+)
 from systems.common.signals import (
     CALM,
     FREE,
@@ -122,6 +130,7 @@ class JointCommandsParams:
 
 _STILL = (0.0, 0.0, 0.0)
 _FREE, _CALM = flat(FREE), flat(CALM)
+_NEAR = columns(ClearanceStatus).index("near")
 _YIELD = 0.7
 _GIVE_WAY = (float(Stop.WALL_LOADED), float(Stop.SENSOR_LOST))
 
@@ -409,8 +418,7 @@ class JointCommands(Block):
         fulcrum = told(self._fulcrum, lambda: view(ToolMotion, tool).tip)
         measured = told(self._measured, lambda: np.concatenate([q, q]))
         permission = told(self._permission, lambda: _FREE)
-        clearance = view(ClearanceStatus, told(self._clearance, lambda: _CALM))
-        evades = clearance.near > 0.5
+        evades = told(self._clearance, lambda: _CALM)[_NEAR] > 0.5
         constants, arm = self._evading if evades else self._constants, self._arm
         step = self._step(
             constants, arm, q, rest, before, time, tool, fulcrum, measured, permission
